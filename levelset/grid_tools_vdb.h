@@ -3,10 +3,9 @@
 // Hashes of the contents of grids, and a check of their transforms. Includes OpenVDB, so include it
 // from .cpp files only.
 
-#include <algorithm>
 #include <cstdint>
-#include <cstring>
 
+#include "levelset/mix_hash.h"
 #include "levelset/vdb.h"
 
 namespace levelset {
@@ -14,24 +13,6 @@ namespace levelset {
 /// Returns true if a transform is a rotation, uniform scale and translation, within a relative
 /// tolerance of 1e-6.
 [[nodiscard]] bool isSimilarity(const openvdb::math::Transform& transform);
-
-[[nodiscard]] inline std::uint64_t mixHash(std::uint64_t hash, std::uint64_t word) {
-  hash ^= word + 0x9e3779b97f4a7c15ull + (hash << 6) + (hash >> 2);
-  hash *= 0xff51afd7ed558ccdull;
-  return hash ^ (hash >> 32);
-}
-
-template <typename T>
-[[nodiscard]] std::uint64_t mixBytes(std::uint64_t hash, const T* data, std::size_t count) {
-  const auto* bytes = reinterpret_cast<const unsigned char*>(data);
-  const std::size_t size = count * sizeof(T);
-  for (std::size_t i = 0; i < size; i += 8) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes + i, std::min<std::size_t>(8, size - i));
-    hash = mixHash(hash, word);
-  }
-  return hash;
-}
 
 /// Begins the hash of a grid with its transform and background.
 template <typename GridT>

@@ -29,7 +29,7 @@ void requireMemory(double estimatedBytes, std::size_t maxBytes) {
   if (estimatedBytes <= static_cast<double>(maxBytes)) return;
   throw ResourceLimit(
       fmt::format("needs about {:.3g} GB of memory, which exceeds the limit of {:.3g} GB; use "
-                  "larger voxels or fewer points, or raise --max-memory",
+                  "larger voxels, fewer points or a part of the input, or raise --max-memory",
                   estimatedBytes * 1e-9, static_cast<double>(maxBytes) * 1e-9));
 }
 

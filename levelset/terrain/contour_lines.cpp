@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 #include "levelset/progress_gate.h"
 #include "levelset/terrain/ground_triangles.h"
 
@@ -201,7 +202,8 @@ std::vector<ContourLine> contourLines(const HeightField& field, const std::vecto
   std::size_t total = 0;
   for (const std::size_t count : counts) total += count;
   // Each piece is held twice, and its point in the line and its growth take 32 bytes.
-  requireMemory(static_cast<double>(total) * (2.0 * sizeof(ContourPiece) + 32), options.maxMemory);
+  requireMemory(static_cast<double>(total) * (2.0 * sizeof(ContourPiece) + 32),
+                memoryLeft(memoryLimit(options.maxMemory)));
   report(options.progress, 0.2);
 
   std::vector<std::vector<ContourPiece>> byRow(static_cast<std::size_t>(rows));

@@ -5,10 +5,11 @@
 #include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SparseCore>
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 
 namespace levelset {
 namespace {
@@ -106,31 +107,29 @@ HeightField filledHeights(HeightField field, const FillOptions& options) {
     throw InvalidInput("no sample has data, so there is nothing to fill from; check the file");
   if (missing >= kNoHole)
     throw ResourceLimit("more than 2^32 samples are missing; crop the terrain");
-  // The result and the numbers of the samples. Triplets, matrix and factor of a hole take about 300
-  // bytes for each sample.
-  requireMemory(static_cast<double>(field.heights.size()) * 8 + static_cast<double>(missing) * 300,
-                options.maxMemory);
-  const std::vector<float>& known = field.heights;
-  std::vector<std::uint32_t> numbers(known.size(), kNoHole);
-  HeightField result = field;
+  // The numbers of the samples. Triplets, matrix and factor of a hole take about 300 bytes for each
+  // of its samples.
+  requireMemory(static_cast<double>(field.heights.size()) * 4 + static_cast<double>(missing) * 300,
+                memoryLeft(memoryLimit(options.maxMemory)));
+  std::vector<std::uint32_t> numbers(field.heights.size(), kNoHole);
   std::size_t done = 0;
-  for (std::size_t sample = 0; sample < known.size(); ++sample) {
-    if (!std::isnan(known[sample]) || numbers[sample] != kNoHole) continue;
+  for (std::size_t sample = 0; sample < field.heights.size(); ++sample) {
+    if (!std::isnan(field.heights[sample])) continue;
     const GroundHole hole = holeAt(field, sample, numbers);
     if (hole.most > hole.least) {
       const Eigen::VectorXd heights = solveHole(field, hole, numbers);
       for (std::size_t n = 0; n < hole.samples.size(); ++n) {
         const double share = std::clamp(heights[static_cast<Eigen::Index>(n)], 0.0, 1.0);
-        result.heights[hole.samples[n]] =
+        field.heights[hole.samples[n]] =
             static_cast<float>(hole.least + share * (hole.most - hole.least));
       }
     } else {
-      for (const std::size_t n : hole.samples) result.heights[n] = static_cast<float>(hole.least);
+      for (const std::size_t n : hole.samples) field.heights[n] = static_cast<float>(hole.least);
     }
     done += hole.samples.size();
     report(options.progress, static_cast<double>(done) / static_cast<double>(missing));
   }
-  return result;
+  return field;
 }
 
 }  // namespace levelset

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
+#include "levelset/memory_limit.h"
 #include "levelset/terrain/ground_triangles.h"
 #include "levelset/transform/crop.h"
 
@@ -147,7 +148,7 @@ class GroundMesher {
     requireMemory(static_cast<double>(samples) * sizeof(std::uint32_t) +
                       static_cast<double>(vertices) * sizeof(Imath::V3d) +
                       static_cast<double>(triangles) * 3 * sizeof(std::uint32_t),
-                  maxMemory_);
+                  memoryLeft(memoryLimit(maxMemory_)));
     if (vertices >= std::size_t{1} << 32)
       throw ResourceLimit(
           fmt::format("the mesh of {} samples has more vertices than 32-bit indices can number; "
@@ -250,7 +251,6 @@ MeshToBandResult solidify(const HeightField& field, double base, double voxelSiz
   return meshToBand(mesh, voxelSize,
                     {.halfWidth = options.halfWidth,
                      .sign = SignMode::Closed,
-                     .roi = options.roi,
                      .maxMemory = options.maxMemory,
                      .progress = options.progress,
                      .onMeshRead = [&mesh] { mesh = TriMesh(); }});

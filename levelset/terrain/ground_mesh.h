@@ -34,7 +34,6 @@ struct GroundMeshOptions {
 struct SolidifyOptions {
   double halfWidth = 3;  ///< half width of the band, voxels
   bool allowMissing = false;
-  RegionOfInterest roi = {};
   std::size_t maxMemory = kNoMemoryLimit;
   Progress progress = {};
 };

@@ -3,10 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <numbers>
 
 #include "levelset/error.h"
+#include "levelset/mix_hash.h"
 
 namespace levelset {
 namespace {
@@ -22,18 +24,6 @@ std::pair<int, int> samplesIn(double origin, double spacing, int count, double l
   return {static_cast<int>(std::clamp(first, 0.0, static_cast<double>(count))),
           static_cast<int>(std::clamp(last, -1.0, static_cast<double>(count) - 1))};
 }
-
-class HeightHash {
- public:
-  void add(const void* data, std::size_t size) {
-    const auto* bytes = static_cast<const unsigned char*>(data);
-    for (std::size_t n = 0; n < size; ++n) hash_ = (hash_ ^ bytes[n]) * 1099511628211u;
-  }
-  [[nodiscard]] std::uint64_t value() const { return hash_; }
-
- private:
-  std::uint64_t hash_ = 14695981039346656037u;
-};
 
 }  // namespace
 
@@ -64,18 +54,18 @@ Imath::Box3d HeightField::bounds() const {
 }
 
 std::uint64_t HeightField::contentHash() const {
-  HeightHash hash;
-  hash.add(&columns, sizeof columns);
-  hash.add(&rows, sizeof rows);
-  hash.add(&origin, sizeof origin);
-  hash.add(&spacing, sizeof spacing);
-  hash.add(&isGeographic, sizeof isGeographic);
-  hash.add(coordinateSystem.data(), coordinateSystem.size());
+  std::uint64_t hash =
+      mixHash(mixHash(0, static_cast<std::uint64_t>(columns)), static_cast<std::uint64_t>(rows));
+  for (const double number : {origin.x, origin.y, spacing.x, spacing.y})
+    hash = mixHash(hash, std::bit_cast<std::uint64_t>(number));
+  hash = mixHash(hash, isGeographic ? 1 : 0);
+  hash = mixBytes(mixHash(hash, coordinateSystem.size()), coordinateSystem.data(),
+                  coordinateSystem.size());
   for (const float height : heights) {
     const float known = std::isnan(height) ? kMissingHeight : height;  // one NaN for all
-    hash.add(&known, sizeof known);
+    hash = mixHash(hash, std::bit_cast<std::uint32_t>(known));
   }
-  return hash.value();
+  return hash;
 }
 
 void requireHeights(const HeightField& field) {

@@ -10,7 +10,7 @@
 namespace pipeline {
 
 bool isTerrainPicture(const std::string& nameOrFormat) {
-  return nameOrFormat == "png" || nameOrFormat.ends_with(".png") || nameOrFormat.ends_with(".PNG");
+  return nameOrFormat == "png" || render::imageFormat(nameOrFormat) == "png";
 }
 
 levelset::HeightField readTerrainPicture(const std::filesystem::path& file, std::size_t maxMemory) {

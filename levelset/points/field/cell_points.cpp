@@ -23,35 +23,38 @@ Eigen::Map<const Eigen::ArrayXd> arrayOf(const std::vector<double>& list) {
 
 }  // namespace
 
+void CellPoints::Ball::move(const V3d& to, double newRadius,
+                            const std::vector<FoundItem>& atCentre) {
+  centre = to;
+  radius = newRadius;
+  farthest = std::sqrt(atCentre.back().squared);
+  candidates = Candidates::Unknown;
+}
+
 const std::vector<FoundItem>& CellPoints::move(const OrientedPoints& points, const V3d& centre,
                                                double radius, std::size_t count) {
   points_ = &points;
   count_ = std::min(count, points.size());
   points.search.closest(centre, count_, atOuter_);
-  outer_.centre = centre;
-  outer_.radius = radius;
-  outer_.farthest = std::sqrt(atOuter_.back().squared);
-  outer_.numbers.clear();
+  outer_.move(centre, radius, atOuter_);
   return atOuter_;
 }
 
 const std::vector<FoundItem>& CellPoints::moveInside(const V3d& centre, double radius) {
-  if (outer_.numbers.empty()) list(outer_);
-  if (outer_.isListed)
-    choose(outer_, centre, atInner_);
-  else
-    points_->search.closest(centre, count_, atInner_);
-  inner_.centre = centre;
-  inner_.radius = radius;
-  inner_.farthest = std::sqrt(atInner_.back().squared);
-  inner_.numbers.clear();
+  find(outer_, centre, atInner_);
+  inner_.move(centre, radius, atInner_);
   return atInner_;
 }
 
 void CellPoints::closest(const V3d& at, std::vector<FoundItem>& found) {
-  if (inner_.numbers.empty()) list(inner_);
-  if (inner_.isListed)
-    choose(inner_, at, found);
+  find(inner_, at, found);
+}
+
+/// Finds the closest points of a position in a ball.
+void CellPoints::find(Ball& ball, const V3d& at, std::vector<FoundItem>& found) {
+  if (ball.candidates == Candidates::Unknown) list(ball);
+  if (ball.candidates == Candidates::Listed)
+    choose(ball, at, found);
   else
     points_->search.closest(at, count_, found);
 }
@@ -61,8 +64,9 @@ void CellPoints::list(Ball& ball) const {
   // The closest points of a position reach at most a radius farther than those of the centre, and
   // the position lies at most a radius from it.
   double squared = square((1 + kRounding) * (ball.farthest + 2 * ball.radius));
-  ball.isListed = true;
-  if (&ball == &inner_ && outer_.isListed) {
+  ball.numbers.clear();
+  ball.candidates = Candidates::Listed;
+  if (&ball == &inner_ && outer_.candidates == Candidates::Listed) {
     for (std::size_t n = 0; n < outer_.numbers.size(); ++n) {
       const V3d arm = V3d(outer_.x[n], outer_.y[n], outer_.z[n]) - ball.centre;
       if (arm.length2() <= squared) ball.numbers.push_back(outer_.numbers[n]);
@@ -70,13 +74,13 @@ void CellPoints::list(Ball& ball) const {
   } else {
     points_->search.visit(ball.centre, squared, [&](const PointItem& item) {
       if (ball.numbers.size() == kMostCandidates) {
-        ball.isListed = false;
+        ball.candidates = Candidates::TooMany;
         squared = -1;  // ends the visit
       } else {
         ball.numbers.push_back(item.index);
       }
     });
-    if (!ball.isListed) return;
+    if (ball.candidates == Candidates::TooMany) return;
   }
   const std::size_t size = ball.numbers.size();
   for (std::vector<double>* axis : {&ball.x, &ball.y, &ball.z}) axis->resize(size);

@@ -26,15 +26,19 @@ class CellPoints {
   void closest(const Imath::V3d& at, std::vector<FoundItem>& found);
 
  private:
+  enum class Candidates { Unknown, Listed, TooMany };
   struct Ball {
     Imath::V3d centre = Imath::V3d(0);
     double radius = 0;
-    double farthest = 0;    ///< distance of the last one of the closest points from the centre
-    bool isListed = false;  ///< the candidates are known
-    std::vector<std::uint32_t> numbers;
+    double farthest = 0;  ///< distance of the last one of the closest points from the centre
+    Candidates candidates = Candidates::Unknown;
+    std::vector<std::uint32_t> numbers;  ///< candidates, with their coordinates
     std::vector<double> x, y, z;
+
+    void move(const Imath::V3d& to, double newRadius, const std::vector<FoundItem>& atCentre);
   };
 
+  void find(Ball& ball, const Imath::V3d& at, std::vector<FoundItem>& found);
   void list(Ball& ball) const;
   void choose(const Ball& ball, const Imath::V3d& at, std::vector<FoundItem>& found);
 

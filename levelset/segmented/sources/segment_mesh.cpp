@@ -63,7 +63,6 @@ class MeshRegions {
       checkSides();
       listPairs();
       result.field = makeField(nullptr);
-      result.thinParts = thinParts(result.field);
     }
     report(options_.progress, 1);
     return result;

@@ -22,14 +22,12 @@ struct SegmentMeshOptions {
 struct SegmentMeshResult {
   SegmentedField field;
   std::size_t patches = 0;  ///< parts of the mesh between junction edges
-  /// Parts of regions that are thinner than a voxel, by label, as thinParts() finds them. With
-  /// SegmentMeshOptions::keepsSheets: parts between surfaces that are nearly parallel and less than
-  /// a voxel apart; where no grid point lies between them (isLost), they become one sheet or
-  /// interface.
-  std::vector<ThinPart> thinParts;
   // With SegmentMeshOptions::keepsSheets:
   std::size_t rimEdges = 0;           ///< edges of the mesh with one triangle
   std::size_t crossingTriangles = 0;  ///< triangles that cross others without sharing an edge
+  /// Parts of regions between surfaces that are nearly parallel and less than a voxel apart, by
+  /// label. Where no grid point lies between them (isLost), they become one sheet or interface.
+  std::vector<ThinPart> thinParts;
 };
 
 /// Makes a segmented field of a mesh whose triangles separate regions, for example a sphere with a

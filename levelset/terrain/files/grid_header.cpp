@@ -9,36 +9,16 @@
 
 #include "levelset/error.h"
 #include "levelset/files/byte_io.h"
+#include "levelset/volume_files/volume_header.h"
 
 namespace levelset::terrain {
 namespace {
 
 constexpr double kMostGridSize = 1 << 30;
 
-std::string loweredWord(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return lower;
-}
-
-/// Takes a word off the rest of a line.
-std::string_view takeLineWord(std::string_view& line) {
-  const auto isBlank = [](char c) { return static_cast<unsigned char>(c) <= ' '; };
-  while (!line.empty() && isBlank(line.front())) line.remove_prefix(1);
-  std::size_t end = 0;
-  while (end < line.size() && !isBlank(line[end])) ++end;
-  const std::string_view word = line.substr(0, end);
-  line.remove_prefix(end);
-  return word;
-}
-
-std::optional<double> gridNumber(std::string_view word) {
-  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (word.empty() || error != std::errc() || end != word.data() + word.size()) return {};
-  return value;
-}
+using volume_files::lowered;
+using volume_files::numberIn;
+using volume_files::takeWord;
 
 }  // namespace
 
@@ -50,7 +30,7 @@ std::string_view GridHeader::take(std::string_view text) {
   while (!text.empty()) {
     const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
     std::string_view line = text.substr(0, end);
-    const std::string word = loweredWord(takeLineWord(line).substr(0, 1000));
+    const std::string word = lowered(takeWord(line).substr(0, 1000));
     // Numbers, and the word nan, are the first heights.
     if (!word.empty() && (!std::isalpha(static_cast<unsigned char>(word[0])) || word == "nan"))
       return text;
@@ -58,11 +38,11 @@ std::string_view GridHeader::take(std::string_view text) {
     if (!word.empty()) {
       constexpr std::size_t kMostWords = 64;
       const std::string shown = word.substr(0, 40);
-      const std::string_view given = takeLineWord(line);
+      const std::string_view given = takeWord(line);
       constexpr std::size_t kLongestWord = 256;
       if (std::max(word.size(), given.size()) > kLongestWord)
         fail(fmt::format("line {}: '{}…' is no line of a header; check the file", lines_, shown));
-      const std::string value = loweredWord(given);
+      const std::string value = lowered(given);
       if (value.empty())
         fail(fmt::format("line {}: '{}' has no value; repair the header", lines_, shown));
       if (!words_.emplace(word, value).second)
@@ -87,7 +67,7 @@ std::string GridHeader::text(const std::string& word) const {
 
 std::optional<double> GridHeader::number(const std::string& word) const {
   if (!has(word)) return {};
-  const std::optional<double> value = gridNumber(text(word));
+  const std::optional<double> value = numberIn<double>(text(word));
   if (!value || !std::isfinite(*value))
     fail(fmt::format("'{}' of {} is not a finite number; repair the header",
                      text(word).substr(0, 40), word));
@@ -161,10 +141,10 @@ void readProjection(const std::filesystem::path& grid, HeightField& field) {
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   std::string_view rest = text;
-  const std::string first = loweredWord(takeLineWord(rest));
+  const std::string first = lowered(takeWord(rest));
   if (first == "projection") {
-    field.coordinateSystem = std::string(takeLineWord(rest));
-    field.isGeographic = loweredWord(field.coordinateSystem) == "geographic";
+    field.coordinateSystem = std::string(takeWord(rest));
+    field.isGeographic = lowered(field.coordinateSystem) == "geographic";
     return;
   }
   // Well-known text: its first word tells the kind of system, and the first text is its name.
@@ -195,7 +175,7 @@ std::string heightFormatOf(const std::filesystem::path& nameOrFormat) {
   std::string word = nameOrFormat.extension().string();
   if (word.empty()) word = nameOrFormat.string();
   if (word.starts_with('.')) word.erase(0, 1);
-  return loweredWord(word);
+  return lowered(word);
 }
 
 }  // namespace levelset::terrain

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include "levelset/error.h"
 #include "levelset/files/byte_io.h"
 #include "levelset/terrain/files/grid_header.h"
+#include "levelset/volume_files/volume_header.h"
 
 namespace levelset {
 namespace {
@@ -80,19 +80,16 @@ HeightField readAsciiGrid(const std::filesystem::path& path,
       if (word.empty())
         refuseHeights(path, fmt::format("the file ends in row {} of {}, column {}; copy it again",
                                         fromTop + 1, field.rows, column + 1));
-      if (word.front() == '+') word.remove_prefix(1);
-      double value = 0;
-      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-      const bool isNumber = error == std::errc() && end == word.data() + word.size();
+      const std::optional<double> value = volume_files::numberIn<double>(word);
       float& height = field.heights[field.index(column, row)];
-      if (isNumber &&
-          ((field.noData && static_cast<float>(value) == static_cast<float>(*field.noData)) ||
-           (marksNan && std::isnan(value)))) {
+      if (value &&
+          ((field.noData && static_cast<float>(*value) == static_cast<float>(*field.noData)) ||
+           (marksNan && std::isnan(*value)))) {
         height = kMissingHeight;
         continue;
       }
-      height = static_cast<float>(value);
-      if (!isNumber || !std::isfinite(height))
+      height = static_cast<float>(value.value_or(NAN));
+      if (!std::isfinite(height))
         refuseHeights(path, fmt::format("line {}: '{}' is no finite height; mark missing heights "
                                         "with the number of NODATA_value",
                                         numbers.line(), word.substr(0, 40)));

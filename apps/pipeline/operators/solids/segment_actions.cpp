@@ -73,7 +73,7 @@ Value segmentByMesh(Invocation& in) {
   if (in.flag("sheets"))
     reportSheets(result, in);
   else
-    reportRegions(result.field, result.thinParts, {}, in);
+    reportRegions(result.field, levelset::thinParts(result.field), {}, in);
   return Value(result.field);
 }
 

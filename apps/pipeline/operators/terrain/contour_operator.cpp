@@ -1,6 +1,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cctype>
+#include <filesystem>
 #include <iterator>
 #include <string>
 
@@ -19,10 +21,12 @@ using levelset::ContourLine;
 using levelset::HeightField;
 
 std::string contourFormat(const Invocation& in) {
-  const std::string name = in.given("format") ? "." + in.text("format") : in.text("file");
-  for (const char* format : {"geojson", "svg"})
-    if (name.ends_with(std::string(".") + format)) return format;
-  return {};
+  std::string format = in.given("format")
+                           ? "." + in.text("format")
+                           : std::filesystem::path(in.text("file")).extension().string();
+  std::transform(format.begin(), format.end(), format.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return format == ".geojson" || format == ".svg" ? format.substr(1) : std::string();
 }
 
 /// Lines as features of GeoJSON. Closed lines end with their first point.

@@ -41,13 +41,27 @@ double longestSideOf(const Imath::Box3d& box) {
   return std::max({size.x, size.y, size.z});
 }
 
+/// Options of the conversion of the mesh, as of 'level-set'.
+levelset::LevelSetOperator::Options conversionOf(Invocation& in) {
+  return {.voxel = {.edge = in.voxelSize(longestSideOf(solidBounds(in)))},
+          .halfWidth = in.number("half-width"),
+          .sign = levelset::SignMode::Closed};
+}
+
+/// Estimate of the mesh: base, ground and four walls. The ground is taken to be flat.
+levelset::ValuePlan meshEstimate(Invocation& in) {
+  const Plan& ground = in.operands[0].plan();
+  levelset::ValuePlan mesh{.bounds = solidBounds(in)};
+  const Imath::V3d size = mesh.bounds.size();
+  mesh.area = 2 * (size.x * size.y + size.y * size.z + size.z * size.x);
+  mesh.triangles = 4.0 * ground.samples.x * ground.samples.y;
+  return mesh;
+}
+
 Value makeTerrainSolid(Invocation& in) {
   const levelset::HeightField& terrain = in.operands[0].terrain();
   levelset::requireLengths(terrain);
-  const levelset::LevelSetOperator::Options options{
-      .voxel = {.edge = in.voxelSize(longestSideOf(solidBounds(in)))},
-      .halfWidth = in.number("half-width"),
-      .sign = levelset::SignMode::Closed};
+  const levelset::LevelSetOperator::Options options = conversionOf(in);
   levelset::TriMesh mesh = levelset::groundSolidMesh(
       terrain, baseOf(in, in.operands[0].plan().bounds),
       {.allowMissing = in.flag("allow-missing"), .maxMemory = in.maxMemory});
@@ -67,26 +81,24 @@ Value makeTerrainSolid(Invocation& in) {
 }
 
 Plan planTerrainSolid(Invocation& in) {
-  const Plan& ground = in.operands[0].plan();
-  Plan plan{.kind = Kind::Band};
-  plan.bounds = solidBounds(in);
-  plan.voxelSize = in.voxelSize(longestSideOf(plan.bounds));
-  plan.halfWidth = in.number("half-width");
+  Plan plan{.kind = Kind::Band, .bounds = solidBounds(in)};
+  const levelset::LevelSetOperator::Options options = conversionOf(in);
+  plan.voxelSize = options.voxel.edge;
+  plan.halfWidth = options.halfWidth;
   if (plan.bounds.isEmpty()) return plan;
-  // Base, ground and four walls. The ground is taken to be flat.
-  const Imath::V3d size = plan.bounds.size();
-  plan.area = 2 * (size.x * size.y + size.y * size.z + size.z * size.x);
-  plan.triangles = 4.0 * ground.samples.x * ground.samples.y;
+  const levelset::ValuePlan mesh = meshEstimate(in);
+  plan.set(levelset::LevelSetOperator::plan(options, {&mesh, 1}, detail::runOf(in)));
   return plan;
 }
 
 std::optional<Cost> costOfTerrainSolid(Invocation& in) {
-  const Plan& ground = in.operands[0].plan();
-  if (!in.planned || ground.samples.x == 0) return std::nullopt;
-  const double triangles = 4.0 * ground.samples.x * ground.samples.y;
-  const double voxels = in.planned->activeVoxels();
-  // The cost of level-set, and the mesh.
-  return Cost{1e-9 * (2800 * triangles + 500 * voxels), 100 * triangles + 4 * voxels};
+  if (!in.planned || in.operands[0].plan().samples.x == 0) return std::nullopt;
+  const levelset::ValuePlan mesh = meshEstimate(in);
+  std::optional<Cost> cost = levelset::LevelSetOperator::cost(
+      conversionOf(in), {levelset::Plans(&mesh, 1), in.planned->estimate()});
+  constexpr double kTriangleBytes = 40;  // of the mesh
+  if (cost) cost->bytes += kTriangleBytes * mesh.triangles;
+  return cost;
 }
 
 Value makeGroundBand(Invocation& in) {

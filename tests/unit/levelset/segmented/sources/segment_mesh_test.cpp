@@ -92,16 +92,17 @@ TEST(SegmentMesh, NamesRoomsThatAreThinnerThanAVoxel) {
     TriMesh mesh;
     for (const auto& [a, b] : {std::pair{0.0, from}, {from, to}, {to, 2.0}})
       mesh = support::joined(mesh, support::boxMesh(low + V3d(a, 0, 0), low + V3d(b, 1, 1)));
-    return segmentMesh(mesh, 0.1);
+    return segmentMesh(mesh, 0.1).field;
   };
-  const SegmentMeshResult thin = rooms(0.97, 1.03);
-  EXPECT_EQ(thin.field.labels(), (std::vector<RegionLabel>{1, 2, 3}));
-  ASSERT_EQ(thin.thinParts.size(), 1u);
-  EXPECT_EQ(thin.thinParts[0].label, 3);
-  EXPECT_EQ(thin.thinParts[0].places, 100u);
-  EXPECT_NEAR(thin.thinParts[0].thickness, 0.06, 0.025);
-  EXPECT_NEAR(thin.thinParts[0].position.x, 1, 0.015);
-  EXPECT_TRUE(rooms(0.85, 1.15).thinParts.empty());
+  const SegmentedField field = rooms(0.97, 1.03);
+  const std::vector<ThinPart> thin = thinParts(field);
+  EXPECT_EQ(field.labels(), (std::vector<RegionLabel>{1, 2, 3}));
+  ASSERT_EQ(thin.size(), 1u);
+  EXPECT_EQ(thin[0].label, 3);
+  EXPECT_EQ(thin[0].places, 100u);
+  EXPECT_NEAR(thin[0].thickness, 0.06, 0.025);
+  EXPECT_NEAR(thin[0].position.x, 1, 0.015);
+  EXPECT_TRUE(thinParts(rooms(0.85, 1.15)).empty());
 }
 
 TEST(SegmentMesh, RepeatsAPartitionWithSecondOrder) {
