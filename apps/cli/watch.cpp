@@ -15,7 +15,7 @@
 
 #include "levelset/error.h"
 #include "levelset/file_target.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace cli {
 namespace {

@@ -14,7 +14,7 @@
 
 #include "levelset/adaptive/octree/adaptive_tree.h"
 #include "levelset/adaptive/tricubic_to_trilinear.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset {
 namespace {

@@ -19,7 +19,7 @@
 #include "levelset/adaptive/octree/adaptive_tree.h"
 #include "levelset/adaptive/octree/hanging_nodes.h"
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/mesh.h"
 
 namespace levelset {

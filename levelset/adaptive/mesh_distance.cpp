@@ -15,7 +15,7 @@
 #include "levelset/geometry/disjoint_sets.h"
 #include "levelset/geometry/mesh_sides.h"
 #include "levelset/geometry/position_table.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/mesh_sign/self_intersections.h"
 
 namespace levelset {

@@ -8,7 +8,7 @@
 #include "levelset/adaptive/mesh_distance.h"
 #include "levelset/convert/mesh_to_band_input.h"
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset {
 namespace {

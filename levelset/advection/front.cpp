@@ -10,7 +10,7 @@
 
 #include "levelset/advection/characteristic.h"
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset::flow {
 namespace {

@@ -15,7 +15,7 @@
 #include "levelset/fields/grid_vdb.h"
 #include "levelset/geometry/closest_on_triangle.h"
 #include "levelset/geometry/position_table.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset {
 namespace {

@@ -8,7 +8,7 @@
 #include "levelset/convert/mesh_to_band_input.h"
 #include "levelset/convert/solid_surface.h"
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset {
 namespace {

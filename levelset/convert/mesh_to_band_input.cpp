@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset::convert {
 namespace {

@@ -14,7 +14,7 @@
 #include "levelset/convert/surface_blocks.h"
 #include "levelset/error.h"
 #include "levelset/geometry/closest_on_triangle.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/mesh_sign/triangle_distance.h"
 #include "levelset/vdb.h"
 

@@ -13,7 +13,7 @@
 #include "levelset/csg/seam_curve.h"
 #include "levelset/distance/distance_transform.h"
 #include "levelset/distance/surface/interpolant.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset::solids {
 namespace {

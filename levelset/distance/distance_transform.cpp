@@ -15,7 +15,7 @@
 #include "levelset/distance/nearest/point_distance.h"
 #include "levelset/distance/signs.h"
 #include "levelset/error.h"
-#include "levelset/memory_estimate.h"
+#include "levelset/memory/memory_estimate.h"
 
 namespace levelset::eikonal {
 namespace {

@@ -14,7 +14,7 @@
 #include "levelset/eikonal/fast_sweeping.h"
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
-#include "levelset/memory_estimate.h"
+#include "levelset/memory/memory_estimate.h"
 
 namespace levelset {
 namespace eikonal {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset::eikonal {
 namespace {

@@ -7,7 +7,7 @@
 #include <mutex>
 
 #include "levelset/distance/distance_transform.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset::eikonal {
 namespace {

@@ -13,7 +13,7 @@
 #include "levelset/files/nano_file_vdb.h"
 #include "levelset/files/vdb_layout.h"
 #include "levelset/files/vdb_writer.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset {
 namespace {

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset {
 namespace {

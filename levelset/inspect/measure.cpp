@@ -10,7 +10,7 @@
 #include "levelset/geometry/surface_components.h"
 #include "levelset/inspect/crease_patches.h"
 #include "levelset/inspect/curved_surface.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/meshing/cells/cell_surface.h"
 #include "levelset/progress_gate.h"
 

@@ -14,7 +14,7 @@
 #include "levelset/error.h"
 #include "levelset/isosurface/filtered_surface.h"
 #include "levelset/isosurface/trilinear_surface.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/vdb.h"
 
 namespace levelset {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/molecules/ball_arcs.h"
 #include "levelset/progress_gate.h"
 

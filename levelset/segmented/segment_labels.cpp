@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress_gate.h"
 #include "levelset/segmented/local/block_surroundings.h"
 #include "levelset/segmented/segmented_data_vdb.h"

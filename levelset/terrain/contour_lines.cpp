@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress_gate.h"
 #include "levelset/terrain/ground_triangles.h"
 

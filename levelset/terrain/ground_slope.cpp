@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress_gate.h"
 
 namespace levelset {

@@ -3,7 +3,7 @@
 
 #include "levelset/error.h"
 #include "levelset/fields/grid_vdb.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/vdb.h"
 #include "levelset/volume_files/volume_header.h"
 

@@ -10,7 +10,7 @@
 
 #include "levelset/error.h"
 #include "levelset/files/byte_io.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/volume_files/volume_header.h"
 
 namespace levelset::volume_files {

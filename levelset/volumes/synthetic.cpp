@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset {
 namespace {

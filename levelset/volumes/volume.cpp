@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "levelset/error.h"
+#include "levelset/mix_hash.h"
 #include "levelset/volumes/volume_numbers.h"
 
 namespace levelset {
@@ -70,11 +71,6 @@ StoredRange rangeOfNumbers(const char* begin, std::size_t from, std::size_t to) 
   range.low = static_cast<double>(low);
   range.high = static_cast<double>(high);
   return range;
-}
-
-std::uint64_t mixedHash(std::uint64_t hash, std::uint64_t word) {
-  hash = (hash ^ word) * 0x9e3779b97f4a7c15u;
-  return hash ^ (hash >> 29);
 }
 
 }  // namespace
@@ -262,19 +258,14 @@ std::uint64_t Volume::contentHash() const {
     std::uint64_t word = 0;
     static_assert(sizeof value <= sizeof word);
     std::memcpy(&word, &value, sizeof value);
-    hash = mixedHash(hash, word);
+    hash = mixHash(hash, word);
   };
   for (int axis = 0; axis < 3; ++axis) add(grid_.size[axis]);
   for (int row = 0; row < 4; ++row)
     for (int column = 0; column < 3; ++column) add(grid_.indexToWorld[row][column]);
   add(scale_.slope);
   add(scale_.intercept);
-  const std::size_t bytes = memoryUse(), whole = bytes / 8 * 8;
-  for (std::size_t n = 0; n < whole; n += 8)
-    hash = mixedHash(hash, loadNumber<std::uint64_t>(data_.begin + n));
-  std::uint64_t last = 0;
-  std::memcpy(&last, data_.begin + whole, bytes - whole);
-  return mixedHash(hash, last);
+  return mixBytes(hash, data_.begin, memoryUse());
 }
 
 }  // namespace levelset

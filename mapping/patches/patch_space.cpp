@@ -8,7 +8,7 @@
 #include "levelset/distance/redistance.h"
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/transform/resample.h"
 
 namespace mapping {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "render/bricks/brick_pool.h"
 #include "render/direct/direct_volume.h"
 #include "render/kernel/csg_traversal.h"

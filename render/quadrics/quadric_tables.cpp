@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress.h"
 #include "render/quadrics/quadric_tree.h"
 

@@ -10,7 +10,7 @@
 
 #include "levelset/error.h"
 #include "levelset/files/json_text.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress.h"
 #include "render/scene/csg_expression.h"
 #include "render/views/shape_document.h"

@@ -10,7 +10,7 @@
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/json_text.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/transform/transform.h"
 #include "levelset/volume_files/volume_file.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 #include "render/scene/scene.h"

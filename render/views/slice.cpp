@@ -10,7 +10,7 @@
 
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "render/camera.h"
 
 namespace render {

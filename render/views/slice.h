@@ -2,7 +2,7 @@
 
 #include <Imath/ImathVec.h>
 
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/narrow_band.h"
 #include "levelset/progress.h"
 #include "render/images/image.h"

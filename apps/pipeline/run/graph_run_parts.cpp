@@ -16,7 +16,7 @@
 #include "levelset/distance/sweep_width.h"
 #include "levelset/error.h"
 #include "levelset/files/band_parts_writer.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace pipeline {
 namespace {

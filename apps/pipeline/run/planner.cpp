@@ -9,7 +9,7 @@
 #include "levelset/error.h"
 #include "levelset/files/band_file.h"
 #include "levelset/files/band_parts_writer.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress.h"
 
 namespace pipeline {

@@ -8,7 +8,7 @@
 
 #include "apps/process_cost.h"
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "render/camera.h"
 #include "render/cpu/cpu_renderer.h"
 #include "render/images/image.h"

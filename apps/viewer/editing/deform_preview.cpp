@@ -10,7 +10,7 @@
 #include "levelset/deform/deform_band.h"
 #include "levelset/error.h"
 #include "levelset/grids/sample.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/meshing/band_to_mesh.h"
 #include "levelset/transform/resample.h"
 

@@ -10,7 +10,7 @@
 #include "apps/viewer/model/matcap_ball.h"
 #include "apps/viewer/model/surface_discs.h"
 #include "apps/viewer/volume/volume_slices.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "render/cpu/cpu_tracer.h"
 #include "render/gpu/device/gl_context.h"
 #include "render/gpu/gpu_tracer.h"

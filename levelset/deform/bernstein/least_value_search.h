@@ -9,7 +9,7 @@
 #include <queue>
 #include <utility>
 
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset {
 

@@ -15,7 +15,7 @@
 #include "levelset/deform/creases/face_fit.h"
 #include "levelset/geometry/mesh_sides.h"
 #include "levelset/geometry/search/triangle_search.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/meshing/cells/divide_sides.h"
 
 namespace levelset {

@@ -12,7 +12,7 @@
 #include "levelset/error.h"
 #include "levelset/geometry/perpendicular.h"
 #include "levelset/geometry/search/point_search.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/molecules/solids/meeting_curve.h"
 #include "levelset/progress_gate.h"
 

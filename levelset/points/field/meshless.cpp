@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 namespace levelset::points {
 namespace {

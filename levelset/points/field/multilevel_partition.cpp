@@ -7,7 +7,7 @@
 #include <cmath>
 #include <memory>
 
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/points/field/local_quadric.h"
 
 namespace levelset::points {

@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/points/processing/point_neighbours.h"
 
 namespace levelset::points {

@@ -10,7 +10,7 @@
 #include <memory>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/rbf/rbf_function.h"
 #include "levelset/rbf/rbf_taylor.h"
 

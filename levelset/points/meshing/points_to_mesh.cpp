@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/points/meshing/part_front.h"
 #include "levelset/points/meshing/sharp_fronts.h"
 #include "levelset/points/projection/delaunay.h"

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/points/processing/orientation.h"
 #include "levelset/points/processing/point_neighbours.h"
 #include "levelset/progress_gate.h"

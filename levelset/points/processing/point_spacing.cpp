@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/points/processing/point_neighbours.h"
 #include "levelset/progress_gate.h"
 

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/points/processing/point_neighbours.h"
 #include "levelset/points/processing/point_spacing.h"
 #include "levelset/points/processing/sample_elimination.h"

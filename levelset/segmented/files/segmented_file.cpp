@@ -20,7 +20,7 @@
 #include "levelset/files/byte_io.h"
 #include "levelset/files/vdb_layout.h"
 #include "levelset/grid_tools_vdb.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/segmented/files/segmented_grids_vdb.h"
 #include "levelset/segmented/segmented_data_vdb.h"
 

@@ -9,7 +9,7 @@
 
 #include "levelset/error.h"
 #include "levelset/geometry/search/triangle_search.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress.h"
 #include "levelset/segmented/meshing/segmented_to_mesh.h"
 

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress_gate.h"
 #include "levelset/segmented/local/cut_tetrahedron.h"
 #include "levelset/segmented/local/kuhn_cell.h"

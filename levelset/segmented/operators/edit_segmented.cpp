@@ -10,7 +10,7 @@
 
 #include "levelset/distance/redistance.h"
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/segmented/operators/field_edit_vdb.h"
 #include "levelset/segmented/operators/hidden_distances_vdb.h"
 #include "levelset/segmented/operators/pack_partition_vdb.h"

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "levelset/distance/redistance.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress.h"
 #include "levelset/segmented/operators/field_edit_vdb.h"
 #include "levelset/segmented/operators/hidden_distances_vdb.h"

@@ -20,7 +20,7 @@
 #include "levelset/geometry/closest_on_triangle.h"
 #include "levelset/geometry/exact_predicates.h"
 #include "levelset/geometry/mesh_sides.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/mesh_sign/mesh_topology.h"
 #include "levelset/mesh_sign/self_intersections.h"
 #include "levelset/segmented/local/block_surroundings.h"

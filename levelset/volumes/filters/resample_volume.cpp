@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress_gate.h"
 #include "levelset/volumes/filters/filtered_volume.h"
 

@@ -165,14 +165,17 @@ TEST_F(TerrainActions, ContoursWriteLines) {
   EXPECT_EQ(first["properties"]["height"], 0.5);
   EXPECT_EQ(first["geometry"]["coordinates"],
             (Json{{1.0, 4.0, 0.5}, {1.0, 2.0, 0.5}, {1.0, 0.0, 0.5}}));
-  ASSERT_EQ(levelsmith("read plane.asc ! contours a.SVG --interval 1").code, 0);
+  ASSERT_EQ(
+      levelsmith("read plane.asc ! contours a.svg --interval 1 ! contours b.SVG --interval 1").code,
+      0);
   const std::string svg = support::readText(folder_ / "a.svg");
   EXPECT_NE(svg.find("viewBox=\"0 0 1000.00 500.00\""), std::string::npos);
+  EXPECT_EQ(support::readText(folder_ / "b.SVG"), svg);
   EXPECT_NE(svg.find("M250.00 0.00L250.00 250.00L250.00 500.00"), std::string::npos);
   expectRefusal("read plane.asc ! contours a.txt --interval 1", 2, "use geojson or svg");
   expectRefusal("read plane.asc ! contours a.svg", 2, "--interval");
   expectRefusal("read plane.asc ! contours a.svg --interval 1e-9", 2, "larger interval");
-  const support::Outcome none = levelsmith("read plane.asc ! contours b.svg --interval 100");
+  const support::Outcome none = levelsmith("read plane.asc ! contours c.svg --interval 100");
   EXPECT_EQ(none.code, 0);
   EXPECT_NE(none.err.find("no line crosses the terrain"), std::string::npos);
 }

@@ -1,4 +1,4 @@
-#include "levelset/memory_estimate.h"
+#include "levelset/memory/memory_estimate.h"
 
 #include <fmt/core.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "levelset/error.h"
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/progress.h"
 
 namespace levelset::eikonal {

@@ -1,4 +1,4 @@
-#include "levelset/memory_limit.h"
+#include "levelset/memory/memory_limit.h"
 
 #include <unistd.h>
 
