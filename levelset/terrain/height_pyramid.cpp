@@ -11,6 +11,7 @@
 #include "levelset/error.h"
 #include "levelset/memory/memory_limit.h"
 #include "levelset/progress_gate.h"
+#include "levelset/terrain/pyramid_parts.h"
 
 namespace levelset {
 namespace {
@@ -28,14 +29,6 @@ double heightOnEdge(const HeightField& field, double x, double y) {
   const double corner = u >= v ? at(column + 1, row) : at(column, row + 1);
   const double first = std::max(u, v), second = std::min(u, v);
   return low + (corner - low) * first + (high - corner) * second;
-}
-
-/// Rounds up to float, so that a bound stays one.
-float heightRoundedUp(double x) {
-  const auto rounded = static_cast<float>(x);
-  return static_cast<double>(rounded) < x
-             ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
-             : rounded;
 }
 
 PyramidPatch measurePatch(const HeightField& field, int cells, int level, int column, int row) {
@@ -63,7 +56,7 @@ PyramidPatch measurePatch(const HeightField& field, int cells, int level, int co
           error, coarseCellError(field, static_cast<int>(i), static_cast<int>(j),
                                  static_cast<int>(std::min<std::int64_t>(i + stride, lastColumn)),
                                  static_cast<int>(std::min<std::int64_t>(j + stride, lastRow))));
-  patch.error = heightRoundedUp(error);
+  patch.error = terrain::heightRoundedUp(error);
   return patch;
 }
 
@@ -118,39 +111,52 @@ double coarseCellError(const HeightField& field, int firstColumn, int firstRow, 
   return error + kRounding * magnitude;
 }
 
-HeightPyramid heightPyramid(const HeightField& field, const PyramidOptions& options) {
-  requireHeights(field);
-  if (options.cells < 2 || options.cells > 128 ||
-      !std::has_single_bit(static_cast<unsigned>(options.cells)))
+namespace terrain {
+
+float heightRoundedUp(double height) {
+  const auto rounded = static_cast<float>(height);
+  return static_cast<double>(rounded) < height
+             ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
+             : rounded;
+}
+
+HeightPyramid unmeasuredPyramid(int columns, int rows, int cells, std::size_t maxMemory) {
+  if (cells < 2 || cells > 128 || !std::has_single_bit(static_cast<unsigned>(cells)))
     throw UsageError(
         fmt::format("the patches of a pyramid have {} cells a side; give a power of two from 2 to "
                     "128",
-                    options.cells));
-  if (field.columns < 2 || field.rows < 2)
+                    cells));
+  if (columns < 2 || rows < 2)
     throw InvalidInput(
         fmt::format("the terrain has {}x{} samples, but a pyramid needs at least "
                     "2x2; give more",
-                    field.columns, field.rows));
-  HeightPyramid pyramid{.cells = options.cells, .levels = {}};
+                    columns, rows));
+  HeightPyramid pyramid{.cells = cells, .levels = {}};
   const auto patchesAt = [&](int samples, int level) {
-    const std::int64_t side = std::int64_t{options.cells} << level;
+    const std::int64_t side = std::int64_t{cells} << level;
     return static_cast<int>((samples - 1 + side - 1) / side);
   };
   // Each level has a quarter of the patches of the one before.
-  requireMemory(
-      4.0 / 3 * sizeof(PyramidPatch) * patchesAt(field.columns, 0) * patchesAt(field.rows, 0),
-      memoryLeft(memoryLimit(options.maxMemory)));
-  std::size_t total = 0;
+  requireMemory(4.0 / 3 * sizeof(PyramidPatch) * patchesAt(columns, 0) * patchesAt(rows, 0),
+                memoryLeft(memoryLimit(maxMemory)));
   for (int level = 0;; ++level) {
-    PyramidLevel next{.columns = patchesAt(field.columns, level),
-                      .rows = patchesAt(field.rows, level),
-                      .patches = {}};
+    PyramidLevel next{
+        .columns = patchesAt(columns, level), .rows = patchesAt(rows, level), .patches = {}};
     next.patches.resize(static_cast<std::size_t>(next.columns) *
                         static_cast<std::size_t>(next.rows));
-    total += next.patches.size();
     pyramid.levels.push_back(std::move(next));
-    if (pyramid.levels.back().patches.size() == 1) break;
+    if (pyramid.levels.back().patches.size() == 1) return pyramid;
   }
+}
+
+}  // namespace terrain
+
+HeightPyramid heightPyramid(const HeightField& field, const PyramidOptions& options) {
+  requireHeights(field);
+  HeightPyramid pyramid =
+      terrain::unmeasuredPyramid(field.columns, field.rows, options.cells, options.maxMemory);
+  std::size_t total = 0;
+  for (const PyramidLevel& level : pyramid.levels) total += level.patches.size();
   ProgressGate gate(options.progress, total);
   for (std::size_t n = 0; n < pyramid.levels.size(); ++n) {
     PyramidLevel& level = pyramid.levels[n];

@@ -11,6 +11,7 @@
 
 #include "levelset/error.h"
 #include "levelset/files/byte_io.h"
+#include "levelset/terrain/files/gdal_grid.h"
 #include "levelset/terrain/files/grid_header.h"
 #include "levelset/volume_files/volume_header.h"
 
@@ -279,8 +280,11 @@ HeightField readHeightField(const std::filesystem::path& path,
     field = readTile(path, options);
   else if (format == "flt" || format == "bil")
     field = readHeaderedGrid(path, format == "flt", options);
+  else if (terrain::isGdalFormat(format))
+    field = terrain::readGdalGrid(path, format, options);
   else
-    throw UsageError(fmt::format("'{}' is no format of heights; use asc, hgt, flt or bil", format));
+    throw UsageError(fmt::format(
+        "'{}' is no format of heights; use asc, hgt, flt, bil, tif, dem or dt0 to dt2", format));
   withContext(inputName(path), [&] { requireHeights(field); });
   if (const std::size_t missing = field.missingCount(); missing > 0 && options.notes)
     options.notes->push_back(fmt::format("{}: {} of {} samples have no data", inputName(path),
@@ -290,7 +294,8 @@ HeightField readHeightField(const std::filesystem::path& path,
 
 bool isHeightFormat(const std::filesystem::path& nameOrFormat) {
   const std::string format = terrain::heightFormatOf(nameOrFormat);
-  return format == "asc" || format == "hgt" || format == "flt" || format == "bil";
+  return format == "asc" || format == "hgt" || format == "flt" || format == "bil" ||
+         terrain::isGdalFormat(format);
 }
 
 bool isAsciiGridFormat(const std::filesystem::path& nameOrFormat) {

@@ -8,6 +8,7 @@
 
 /// Reads and writes height fields: ESRI ASCII grids (`.asc`), tiles of the Shuttle Radar Topography
 /// Mission (`.hgt`), and numbers with an ESRI header beside them (`.flt`, `.bil`, with `.hdr`).
+/// Where GDAL is found, also GeoTIFF (`.tif`, `.tiff`), `.dem` and DTED (`.dt0` to `.dt2`).
 namespace levelset {
 
 struct ReadHeightFieldOptions {
@@ -22,7 +23,7 @@ struct ReadHeightFieldOptions {
 /// centres of their cells. The name of the coordinate system comes from the `.prj` file beside
 /// the grid, if there is one. A `.hgt` file has its latitude and longitude in its name, such as
 /// N37W123.hgt.
-/// @throws UsageError for an unknown format
+/// @throws UsageError for an unknown format, or one that needs GDAL in a build without it
 /// @throws IoError when a file cannot be opened
 /// @throws InvalidInput for a damaged header, for a file that is shorter or longer than its header
 ///         states, and for a number that is not finite

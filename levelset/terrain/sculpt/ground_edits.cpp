@@ -1,0 +1,165 @@
+#include "levelset/terrain/sculpt/ground_edits.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "levelset/error.h"
+#include "levelset/files/byte_io.h"
+#include "levelset/memory/memory_limit.h"
+#include "levelset/mix_hash.h"
+
+namespace levelset {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "files of edits are little endian");
+
+constexpr std::string_view kMagic = "LSEDITS1";
+
+/// Numbers of samples of a tile along x and y; a tile is cut at the end of the field.
+std::pair<std::size_t, std::size_t> tileSize(const GroundEdits& edits, std::uint32_t column,
+                                             std::uint32_t row) {
+  const auto samples = [](std::uint32_t tile, int count) {
+    const std::int64_t left = count - static_cast<std::int64_t>(tile) * kEditTile;
+    return static_cast<std::size_t>(std::clamp<std::int64_t>(left, 0, kEditTile));
+  };
+  return {samples(column, edits.columns), samples(row, edits.rows)};
+}
+
+/// Bytes of a file, with the name of the file for messages.
+class EditsReader {
+ public:
+  EditsReader(std::string_view bytes, const std::filesystem::path& path)
+      : bytes_(bytes), path_(path) {}
+
+  template <typename T>
+  T take() {
+    T value;
+    copy(&value, sizeof value);
+    return value;
+  }
+  void copy(void* to, std::size_t size) {
+    if (size > left()) fail("the file is cut; copy it again");
+    std::memcpy(to, bytes_.data() + at_, size);
+    at_ += size;
+  }
+  [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
+  [[noreturn]] void fail(const std::string& what) const {
+    throw InvalidInput(fmt::format("{}: {}", inputName(path_), what));
+  }
+
+ private:
+  std::string_view bytes_;
+  const std::filesystem::path& path_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace
+
+void applyEdits(HeightField& field, const GroundEdits& edits) {
+  if (field.columns != edits.columns || field.rows != edits.rows)
+    throw InvalidInput(
+        fmt::format("the edits are those of a terrain of {}x{} samples, but this one "
+                    "has {}x{}; use the terrain for which they were made",
+                    edits.columns, edits.rows, field.columns, field.rows));
+  if (field.contentHash() != edits.baseHash)
+    throw InvalidInput(
+        "the edits are those of a terrain with other heights or another place; use the terrain for "
+        "which they were made");
+  for (const GroundEdits::Tile& tile : edits.tiles)
+    if (const auto [width, height] = tileSize(edits, tile.column, tile.row);
+        width * height == 0 || tile.heights.size() != width * height)
+      throw InvalidInput(
+          fmt::format("tile ({}, {}) of the edits has {} heights, but {} samples; "
+                      "make the edits again",
+                      tile.column, tile.row, tile.heights.size(), width * height));
+  for (const GroundEdits::Tile& tile : edits.tiles) {
+    const auto [width, height] = tileSize(edits, tile.column, tile.row);
+    for (std::size_t row = 0; row < height; ++row)
+      std::copy_n(tile.heights.begin() + static_cast<std::ptrdiff_t>(row * width), width,
+                  field.heights.begin() +
+                      static_cast<std::ptrdiff_t>(field.index(
+                          static_cast<int>(tile.column) * kEditTile,
+                          static_cast<int>(tile.row) * kEditTile + static_cast<int>(row))));
+  }
+}
+
+void writeGroundEdits(const std::filesystem::path& path, const GroundEdits& edits) {
+  ByteWriter out(path, false);
+  std::uint64_t hash = 0;
+  const auto put = [&](const auto* data, std::size_t count) {
+    out.write(data, count * sizeof *data);
+    hash = mixBytes(hash, data, count);
+  };
+  put(kMagic.data(), kMagic.size());
+  put(&edits.baseHash, 1);
+  const std::uint32_t sizes[] = {static_cast<std::uint32_t>(edits.columns),
+                                 static_cast<std::uint32_t>(edits.rows),
+                                 static_cast<std::uint32_t>(edits.tiles.size())};
+  put(sizes, std::size(sizes));
+  for (const GroundEdits::Tile& tile : edits.tiles) {
+    const std::uint32_t place[] = {tile.column, tile.row};
+    put(place, std::size(place));
+    put(tile.heights.data(), tile.heights.size());
+  }
+  out.writeValue(hash);
+  out.commit();
+}
+
+GroundEdits readGroundEdits(const std::filesystem::path& path, std::size_t maxMemory) {
+  const MappedFile file(path, maxMemory, false);
+  EditsReader in(file.view(), path);
+  std::uint64_t hash = 0;
+  const auto get = [&](auto* data, std::size_t count) {
+    in.copy(data, count * sizeof *data);
+    hash = mixBytes(hash, data, count);
+  };
+  char magic[kMagic.size()];
+  if (in.left() < sizeof magic) in.fail("this is no file of terrain edits; give an .edits file");
+  get(magic, sizeof magic);
+  if (std::string_view(magic, sizeof magic) != kMagic)
+    in.fail("this is no file of terrain edits, or one of another version; give an .edits file");
+  GroundEdits edits;
+  std::uint32_t sizes[3];
+  get(&edits.baseHash, 1);
+  get(sizes, std::size(sizes));
+  constexpr std::uint32_t kMostSamples = std::uint32_t{1} << 30;
+  if (sizes[0] < 1 || sizes[1] < 1 || sizes[0] > kMostSamples || sizes[1] > kMostSamples)
+    in.fail(fmt::format("the terrain has {}x{} samples; copy the file again", sizes[0], sizes[1]));
+  edits.columns = static_cast<int>(sizes[0]);
+  edits.rows = static_cast<int>(sizes[1]);
+  // A tile has a place and one height at least.
+  if (sizes[2] > in.left() / 12) in.fail("the file is cut; copy it again");
+  requireMemory(
+      static_cast<double>(in.left()) + static_cast<double>(sizes[2]) * sizeof(GroundEdits::Tile),
+      memoryLeft(memoryLimit(maxMemory)));
+  edits.tiles.resize(sizes[2]);
+  for (std::size_t n = 0; n < edits.tiles.size(); ++n) {
+    GroundEdits::Tile& tile = edits.tiles[n];
+    std::uint32_t place[2];
+    get(place, 2);
+    tile.column = place[0];
+    tile.row = place[1];
+    const auto [width, height] = tileSize(edits, tile.column, tile.row);
+    const GroundEdits::Tile* before = n > 0 ? &edits.tiles[n - 1] : nullptr;
+    if (width * height == 0 ||
+        (before && std::pair(before->row, before->column) >= std::pair(tile.row, tile.column)))
+      in.fail(fmt::format("tile {} is at ({}, {}), out of place; copy the file again", n + 1,
+                          tile.column, tile.row));
+    if (width * height * sizeof(float) > in.left()) in.fail("the file is cut; copy it again");
+    tile.heights.resize(width * height);
+    get(tile.heights.data(), tile.heights.size());
+    for (const float z : tile.heights)
+      if (std::isinf(z)) in.fail("a height is infinite; copy the file again");
+  }
+  if (in.take<std::uint64_t>() != hash || in.left() > 0)
+    in.fail("the hash at its end is not that of its content; copy the file again");
+  return edits;
+}
+
+}  // namespace levelset

@@ -1,0 +1,205 @@
+#include "levelset/terrain/sculpt/sculpted_ground.h"
+
+#include <algorithm>
+#include <deque>
+#include <utility>
+#include <vector>
+
+#include "levelset/terrain/sculpt/pyramid_errors.h"
+
+namespace levelset {
+namespace {
+
+/// Heights of a rectangle: those before a change, or after it was undone those behind it.
+struct HeightChange {
+  SampleRange range;
+  std::vector<float> heights;
+
+  HeightChange(const HeightField& field, const SampleRange& changed) : range(changed) {
+    heights.reserve(static_cast<std::size_t>(range.columns()) *
+                    static_cast<std::size_t>(range.rows()));
+    for (int row = range.firstRow; row <= range.lastRow; ++row) {
+      const auto first =
+          field.heights.begin() + static_cast<std::ptrdiff_t>(field.index(range.firstColumn, row));
+      heights.insert(heights.end(), first, first + range.columns());
+    }
+  }
+
+  void swapWith(HeightField& field) {
+    auto from = heights.begin();
+    for (int row = range.firstRow; row <= range.lastRow; ++row, from += range.columns())
+      std::swap_ranges(
+          from, from + range.columns(),
+          field.heights.begin() + static_cast<std::ptrdiff_t>(field.index(range.firstColumn, row)));
+  }
+};
+
+using Stroke = std::vector<HeightChange>;
+
+std::size_t bytesOf(const Stroke& stroke) {
+  std::size_t bytes = 0;
+  for (const HeightChange& change : stroke)
+    bytes += sizeof change + change.heights.size() * sizeof(float);
+  return bytes;
+}
+
+SampleRange united(const SampleRange& a, const SampleRange& b) {
+  if (a.isEmpty()) return b;
+  if (b.isEmpty()) return a;
+  return {.firstColumn = std::min(a.firstColumn, b.firstColumn),
+          .firstRow = std::min(a.firstRow, b.firstRow),
+          .lastColumn = std::max(a.lastColumn, b.lastColumn),
+          .lastRow = std::max(a.lastRow, b.lastRow)};
+}
+
+}  // namespace
+
+struct SculptedGround::State {
+  State(HeightField given, const SculptOptions& options)
+      : field(std::move(given)),
+        baseHash(field.contentHash()),
+        undoMemory(options.undoMemory),
+        maxMemory(options.maxMemory),
+        tileColumns((field.columns - 1) / kEditTile + 1),
+        isEdited(static_cast<std::size_t>(tileColumns) *
+                 static_cast<std::size_t>((field.rows - 1) / kEditTile + 1)) {}
+
+  std::vector<bool>::reference editedTile(int column, int row) {
+    return isEdited[static_cast<std::size_t>(row) * static_cast<std::size_t>(tileColumns) +
+                    static_cast<std::size_t>(column)];
+  }
+
+  void markEdited(const SampleRange& range) {
+    for (int row = range.firstRow / kEditTile; row <= range.lastRow / kEditTile; ++row)
+      for (int column = range.firstColumn / kEditTile; column <= range.lastColumn / kEditTile;
+           ++column)
+        editedTile(column, row) = true;
+  }
+
+  /// Exchanges the heights of a stroke. @param isForward  the first change goes first
+  SampleRange exchange(Stroke& stroke, bool isForward) {
+    if (isForward)
+      for (auto change = stroke.begin(); change != stroke.end(); ++change) change->swapWith(field);
+    else
+      for (auto change = stroke.rbegin(); change != stroke.rend(); ++change)
+        change->swapWith(field);
+    SampleRange changed;
+    for (const HeightChange& change : stroke) {
+      errors->update(field, change.range);
+      changed = united(changed, change.range);
+    }
+    return changed;
+  }
+
+  void limitUndo() {
+    while (undoBytes > undoMemory && done.size() > 1) {
+      undoBytes -= bytesOf(done.front());
+      done.pop_front();
+    }
+  }
+
+  HeightField field;
+  std::uint64_t baseHash;
+  std::size_t undoMemory, maxMemory;
+  int tileColumns;
+  std::vector<bool> isEdited;
+  std::unique_ptr<terrain::PyramidErrors> errors;
+  std::deque<Stroke> done;
+  std::vector<Stroke> undone;  // the last one is redone first
+  std::size_t undoBytes = 0;   // of the strokes that are done
+  bool startsStroke = true;
+};
+
+SculptedGround::SculptedGround(HeightField field, const SculptOptions& options) {
+  requireHeights(field);
+  state_ = std::make_unique<State>(std::move(field), options);
+  if (options.edits) {
+    applyEdits(state_->field, *options.edits);
+    for (const GroundEdits::Tile& tile : options.edits->tiles)
+      state_->editedTile(static_cast<int>(tile.column), static_cast<int>(tile.row)) = true;
+  }
+  state_->errors = std::make_unique<terrain::PyramidErrors>(
+      state_->field,
+      PyramidOptions{
+          .cells = options.cells, .maxMemory = options.maxMemory, .progress = options.progress});
+}
+
+SculptedGround::~SculptedGround() = default;
+
+const HeightField& SculptedGround::field() const {
+  return state_->field;
+}
+
+const HeightPyramid& SculptedGround::pyramid() const {
+  return state_->errors->pyramid();
+}
+
+void SculptedGround::beginStroke() {
+  state_->startsStroke = true;
+}
+
+SampleRange SculptedGround::apply(const BrushDab& dab) {
+  requireDab(dab);
+  const SampleRange range = dabRange(state_->field, dab);
+  if (range.isEmpty()) return range;
+  HeightChange change(state_->field, range);
+  applyDab(state_->field, dab, state_->maxMemory);
+  if (std::exchange(state_->startsStroke, false)) {
+    state_->done.emplace_back();
+    state_->undone.clear();
+  }
+  state_->undoBytes += sizeof change + change.heights.size() * sizeof(float);
+  state_->done.back().push_back(std::move(change));
+  state_->limitUndo();
+  state_->markEdited(range);
+  state_->errors->update(state_->field, range);
+  return range;
+}
+
+bool SculptedGround::canUndo() const {
+  return !state_->done.empty();
+}
+
+bool SculptedGround::canRedo() const {
+  return !state_->undone.empty();
+}
+
+SampleRange SculptedGround::undo() {
+  if (!canUndo()) return {};
+  state_->startsStroke = true;
+  state_->undone.push_back(std::move(state_->done.back()));
+  state_->done.pop_back();
+  state_->undoBytes -= bytesOf(state_->undone.back());
+  return state_->exchange(state_->undone.back(), false);
+}
+
+SampleRange SculptedGround::redo() {
+  if (!canRedo()) return {};
+  state_->startsStroke = true;
+  state_->done.push_back(std::move(state_->undone.back()));
+  state_->undone.pop_back();
+  state_->undoBytes += bytesOf(state_->done.back());
+  return state_->exchange(state_->done.back(), true);
+}
+
+GroundEdits SculptedGround::edits() const {
+  const HeightField& field = state_->field;
+  GroundEdits edits{
+      .baseHash = state_->baseHash, .columns = field.columns, .rows = field.rows, .tiles = {}};
+  for (std::size_t n = 0; n < state_->isEdited.size(); ++n) {
+    if (!state_->isEdited[n]) continue;
+    const int tileColumn = static_cast<int>(n) % state_->tileColumns,
+              tileRow = static_cast<int>(n) / state_->tileColumns;
+    const int firstColumn = tileColumn * kEditTile, firstRow = tileRow * kEditTile;
+    HeightChange tile(field, {.firstColumn = firstColumn,
+                              .firstRow = firstRow,
+                              .lastColumn = std::min(firstColumn + kEditTile, field.columns) - 1,
+                              .lastRow = std::min(firstRow + kEditTile, field.rows) - 1});
+    edits.tiles.push_back({.column = static_cast<std::uint32_t>(tileColumn),
+                           .row = static_cast<std::uint32_t>(tileRow),
+                           .heights = std::move(tile.heights)});
+  }
+  return edits;
+}
+
+}  // namespace levelset
