@@ -58,6 +58,7 @@ std::vector<Operator> allOperators() {
       thinOperator(),
       terrainOperator(),
       slopeOperator(),
+      sculptOperator(),
       hillshadeOperator(),
       contoursOperator(),
       solidifyOperator(),

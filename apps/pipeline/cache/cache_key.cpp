@@ -30,6 +30,13 @@ std::string lowerExtension(const std::filesystem::path& file) {
   return extension;
 }
 
+/// Returns true for files that may keep their data in another file: scenes and other documents,
+/// and headers of volumes.
+bool refersToFiles(const std::string& extension) {
+  return extension == ".json" || extension == ".mhd" || extension == ".nhdr" ||
+         extension == ".hdr" || extension == ".img";
+}
+
 std::optional<std::string> digestOfFile(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return {};
@@ -60,11 +67,14 @@ void addTerrainFiles(std::string& text, const std::filesystem::path& file, const
   if (!levelset::isHeightFormat(format == node.options.end() ? file.string() : format->second))
     return;
   add(text, "name", file.stem().string());
-  for (const char* extension : {".hdr", ".prj"}) {
+  // Headers and coordinate systems; GDAL also reads places, statistics and masks.
+  for (const char* extension : {".hdr", ".prj", ".tfw", ".tifw", ".wld"}) {
     std::filesystem::path beside = file;
     beside.replace_extension(extension);
     add(text, extension, digestOfFile(beside).value_or(""));
   }
+  for (const char* ending : {".aux.xml", ".msk"})
+    add(text, ending, digestOfFile(file.string() + ending).value_or(""));
 }
 
 }  // namespace
@@ -85,8 +95,8 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
                                                 const Node& node) const {
   const std::optional<FileStamp> stamp = stampOf(file);
   const std::string extension = lowerExtension(file);
-  // Not cached: the file is no regular file, or is a .json, which refers to further files.
-  if (!stamp || extension == ".json") return {};
+  // Not cached: the file is no regular file, or one that refers to further files.
+  if (!stamp || refersToFiles(extension)) return {};
   std::string about = stampText(*stamp);
   const auto grid = node.options.find("grid");
   const bool isNamed = extension == ".vdb" && grid != node.options.end();

@@ -51,6 +51,7 @@ namespace pipeline {
 
 [[nodiscard]] Operator terrainOperator();
 [[nodiscard]] Operator slopeOperator();
+[[nodiscard]] Operator sculptOperator();
 [[nodiscard]] Operator hillshadeOperator();
 [[nodiscard]] Operator contoursOperator();
 [[nodiscard]] Operator solidifyOperator();

@@ -31,6 +31,15 @@ std::pair<std::size_t, std::size_t> tileSize(const GroundEdits& edits, std::uint
   return {samples(column, edits.columns), samples(row, edits.rows)};
 }
 
+/// First height of a row of a tile in the field.
+template <typename Field>
+auto heightsOfTile(Field& field, const GroundEdits::Tile& tile, std::size_t row) {
+  const std::size_t at =
+      field.index(static_cast<int>(tile.column) * kEditTile,
+                  static_cast<int>(tile.row) * kEditTile + static_cast<int>(row));
+  return field.heights.begin() + static_cast<std::ptrdiff_t>(at);
+}
+
 /// Bytes of a file, with the name of the file for messages.
 class EditsReader {
  public:
@@ -61,6 +70,42 @@ class EditsReader {
 
 }  // namespace
 
+GroundChanges::GroundChanges(const HeightField& base)
+    : baseHash_(base.contentHash()),
+      tileColumns_(static_cast<std::size_t>((base.columns - 1) / kEditTile + 1)),
+      hasChanged_(tileColumns_ * static_cast<std::size_t>((base.rows - 1) / kEditTile + 1)) {}
+
+void GroundChanges::add(const SampleRange& changed) {
+  if (changed.isEmpty()) return;
+  for (int row = changed.firstRow / kEditTile; row <= changed.lastRow / kEditTile; ++row)
+    for (int column = changed.firstColumn / kEditTile; column <= changed.lastColumn / kEditTile;
+         ++column)
+      hasChanged_[static_cast<std::size_t>(row) * tileColumns_ + static_cast<std::size_t>(column)] =
+          true;
+}
+
+void GroundChanges::add(const GroundEdits& edits) {
+  for (const GroundEdits::Tile& tile : edits.tiles)
+    hasChanged_[tile.row * tileColumns_ + tile.column] = true;
+}
+
+GroundEdits GroundChanges::edits(const HeightField& field) const {
+  GroundEdits edits{
+      .baseHash = baseHash_, .columns = field.columns, .rows = field.rows, .tiles = {}};
+  for (std::size_t n = 0; n < hasChanged_.size(); ++n) {
+    if (!hasChanged_[n]) continue;
+    GroundEdits::Tile& tile = edits.tiles.emplace_back();
+    tile.column = static_cast<std::uint32_t>(n % tileColumns_);
+    tile.row = static_cast<std::uint32_t>(n / tileColumns_);
+    const auto [width, height] = tileSize(edits, tile.column, tile.row);
+    for (std::size_t row = 0; row < height; ++row) {
+      const auto first = heightsOfTile(field, tile, row);
+      tile.heights.insert(tile.heights.end(), first, first + static_cast<std::ptrdiff_t>(width));
+    }
+  }
+  return edits;
+}
+
 void applyEdits(HeightField& field, const GroundEdits& edits) {
   if (field.columns != edits.columns || field.rows != edits.rows)
     throw InvalidInput(
@@ -82,10 +127,7 @@ void applyEdits(HeightField& field, const GroundEdits& edits) {
     const auto [width, height] = tileSize(edits, tile.column, tile.row);
     for (std::size_t row = 0; row < height; ++row)
       std::copy_n(tile.heights.begin() + static_cast<std::ptrdiff_t>(row * width), width,
-                  field.heights.begin() +
-                      static_cast<std::ptrdiff_t>(field.index(
-                          static_cast<int>(tile.column) * kEditTile,
-                          static_cast<int>(tile.row) * kEditTile + static_cast<int>(row))));
+                  heightsOfTile(field, tile, row));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "levelset/terrain/height_field.h"
+#include "levelset/terrain/sample_range.h"
 
 /// Changed heights of a terrain, which are kept in a file beside its data.
 namespace levelset {
@@ -20,6 +21,24 @@ struct GroundEdits {
   std::uint64_t baseHash = 0;  ///< HeightField::contentHash() of the unchanged terrain
   int columns = 0, rows = 0;   ///< samples of the terrain
   std::vector<Tile> tiles;     ///< by row and column, each at most once
+};
+
+/// Notes which tiles of a terrain have changed.
+class GroundChanges {
+ public:
+  /// @param base  the unchanged terrain
+  explicit GroundChanges(const HeightField& base);
+
+  void add(const SampleRange& changed);
+  /// Adds the tiles of earlier edits of the same terrain.
+  void add(const GroundEdits& edits);
+  /// Heights of all tiles that were added. @param field  the changed terrain
+  [[nodiscard]] GroundEdits edits(const HeightField& field) const;
+
+ private:
+  std::uint64_t baseHash_;
+  std::size_t tileColumns_;
+  std::vector<bool> hasChanged_;  // by row and column of tiles
 };
 
 /// Gives a terrain the heights of the edits.

@@ -57,24 +57,9 @@ SampleRange united(const SampleRange& a, const SampleRange& b) {
 struct SculptedGround::State {
   State(HeightField given, const SculptOptions& options)
       : field(std::move(given)),
-        baseHash(field.contentHash()),
+        changes(field),
         undoMemory(options.undoMemory),
-        maxMemory(options.maxMemory),
-        tileColumns((field.columns - 1) / kEditTile + 1),
-        isEdited(static_cast<std::size_t>(tileColumns) *
-                 static_cast<std::size_t>((field.rows - 1) / kEditTile + 1)) {}
-
-  std::vector<bool>::reference editedTile(int column, int row) {
-    return isEdited[static_cast<std::size_t>(row) * static_cast<std::size_t>(tileColumns) +
-                    static_cast<std::size_t>(column)];
-  }
-
-  void markEdited(const SampleRange& range) {
-    for (int row = range.firstRow / kEditTile; row <= range.lastRow / kEditTile; ++row)
-      for (int column = range.firstColumn / kEditTile; column <= range.lastColumn / kEditTile;
-           ++column)
-        editedTile(column, row) = true;
-  }
+        maxMemory(options.maxMemory) {}
 
   /// Exchanges the heights of a stroke. @param isForward  the first change goes first
   SampleRange exchange(Stroke& stroke, bool isForward) {
@@ -99,10 +84,8 @@ struct SculptedGround::State {
   }
 
   HeightField field;
-  std::uint64_t baseHash;
+  GroundChanges changes;
   std::size_t undoMemory, maxMemory;
-  int tileColumns;
-  std::vector<bool> isEdited;
   std::unique_ptr<terrain::PyramidErrors> errors;
   std::deque<Stroke> done;
   std::vector<Stroke> undone;  // the last one is redone first
@@ -115,8 +98,7 @@ SculptedGround::SculptedGround(HeightField field, const SculptOptions& options) 
   state_ = std::make_unique<State>(std::move(field), options);
   if (options.edits) {
     applyEdits(state_->field, *options.edits);
-    for (const GroundEdits::Tile& tile : options.edits->tiles)
-      state_->editedTile(static_cast<int>(tile.column), static_cast<int>(tile.row)) = true;
+    state_->changes.add(*options.edits);
   }
   state_->errors = std::make_unique<terrain::PyramidErrors>(
       state_->field,
@@ -151,7 +133,7 @@ SampleRange SculptedGround::apply(const BrushDab& dab) {
   state_->undoBytes += sizeof change + change.heights.size() * sizeof(float);
   state_->done.back().push_back(std::move(change));
   state_->limitUndo();
-  state_->markEdited(range);
+  state_->changes.add(range);
   state_->errors->update(state_->field, range);
   return range;
 }
@@ -183,23 +165,7 @@ SampleRange SculptedGround::redo() {
 }
 
 GroundEdits SculptedGround::edits() const {
-  const HeightField& field = state_->field;
-  GroundEdits edits{
-      .baseHash = state_->baseHash, .columns = field.columns, .rows = field.rows, .tiles = {}};
-  for (std::size_t n = 0; n < state_->isEdited.size(); ++n) {
-    if (!state_->isEdited[n]) continue;
-    const int tileColumn = static_cast<int>(n) % state_->tileColumns,
-              tileRow = static_cast<int>(n) / state_->tileColumns;
-    const int firstColumn = tileColumn * kEditTile, firstRow = tileRow * kEditTile;
-    HeightChange tile(field, {.firstColumn = firstColumn,
-                              .firstRow = firstRow,
-                              .lastColumn = std::min(firstColumn + kEditTile, field.columns) - 1,
-                              .lastRow = std::min(firstRow + kEditTile, field.rows) - 1});
-    edits.tiles.push_back({.column = static_cast<std::uint32_t>(tileColumn),
-                           .row = static_cast<std::uint32_t>(tileRow),
-                           .heights = std::move(tile.heights)});
-  }
-  return edits;
+  return state_->changes.edits(state_->field);
 }
 
 }  // namespace levelset

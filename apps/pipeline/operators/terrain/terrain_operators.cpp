@@ -12,6 +12,7 @@
 #include "levelset/terrain/fill_heights.h"
 #include "levelset/terrain/ground_slope.h"
 #include "levelset/terrain/height_field.h"
+#include "levelset/terrain/sculpt/ground_edits.h"
 
 namespace pipeline {
 namespace {
@@ -55,6 +56,8 @@ HeightField sourceOf(Invocation& in) {
 
 Value makeTerrain(Invocation& in) {
   HeightField terrain = sourceOf(in);
+  if (in.given("edits"))
+    levelset::applyEdits(terrain, levelset::readGroundEdits(in.text("edits"), in.maxMemory));
   if (in.flag("flip")) terrain = levelset::flippedHeights(std::move(terrain));
   terrain = placedTerrain(in, std::move(terrain));
   if (in.given("crop")) terrain = levelset::croppedHeights(terrain, in.box("crop"));
@@ -164,7 +167,8 @@ Operator terrainOperator() {
       .group = "Terrain",
       .summary = "set spacing, heights and missing data of a terrain, or make one of a volume",
       .details =
-          "Heights are along z. The options apply in this order: --no-data, --flip, --spacing, "
+          "Heights are along z. The options apply in this order: --no-data, --edits, --flip, "
+          "--spacing, "
           "--origin, --metric, --crop, --scale, --fill. A volume of one layer, as 'read' makes of "
           "a "
           ".raw file, becomes a terrain, and its first row has the least y. Samples without data "
@@ -202,6 +206,9 @@ Operator terrainOperator() {
                  {.name = "no-data",
                   .type = ParamType::Number,
                   .doc = "samples of this height have no data"},
+                 {.name = "edits",
+                  .type = ParamType::Path,
+                  .doc = "heights that 'sculpt --edits' has changed, for the terrain before it"},
                  {.name = "flip",
                   .type = ParamType::Flag,
                   .doc = "reverse the order of the rows, for a .raw file whose first row is the "

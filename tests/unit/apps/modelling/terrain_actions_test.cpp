@@ -231,6 +231,50 @@ TEST_F(TerrainActions, MeshAndRenderShowTheGround) {
   EXPECT_EQ(levelsmith("read hole.asc ! render a.png --size 32x24 --up 0,0,1").code, 0);
 }
 
+TEST_F(TerrainActions, SculptChangesHeights) {
+  const Json raised = json(
+      "read plane.asc ! sculpt --brush raise --at 4,2,0 --radius 1.5 "
+      "--strength 3 ! info --json");
+  EXPECT_EQ(raised["range"], (Json{0.0, 5.0}));  // only the sample (4, 2) of height 2
+  // A road along the middle row, with heights that rise to the east.
+  const Json road = json(
+      "read plane.asc ! sculpt --brush flatten --at '0,2,10 8,2,14' --stroke "
+      "--to-points --radius 0.5 --strength 1 ! info --json");
+  EXPECT_EQ(road["range"], (Json{0.0, 14.0}));
+  EXPECT_EQ(levelsmith("read hole.asc ! sculpt --brush noise --at 4,2,0 --radius 4 --strength 1 "
+                       "--wavelength 3 --seed 2 ! sculpt --brush smooth --at 4,2,0 --radius 4 "
+                       "--strength 1 ! sculpt --brush erode --at 4,2,0 --radius 4 --strength 1 "
+                       "--talus 5 --passes 3 ! info")
+                .code,
+            0);
+  const support::Outcome beside =
+      levelsmith("read plane.asc ! sculpt --brush raise --at 99,2,0 --radius 1 --strength 3");
+  EXPECT_EQ(beside.code, 0);
+  EXPECT_NE(beside.err.find("beside the terrain"), std::string::npos);
+  const std::string brush = "read plane.asc ! sculpt --at 4,2,0 --radius 1 --strength 0.5 --brush ";
+  expectRefusal(brush + "raise --talus 3", 2, "--talus has no meaning for --brush raise");
+  expectRefusal(brush + "erode --talus 90", 2, "--talus");
+  expectRefusal(brush + "smooth --passes 0", 2, "1 to 1000");
+  expectRefusal(brush + "flatten --level 1 --to-points", 2, "leave one out");
+  expectRefusal("read plane.asc ! sculpt --brush smooth --at 4,2,0 --radius 1 --strength 2", 2,
+                "0 to 1");
+  expectRefusal(
+      "read plane.asc ! sculpt --brush raise --at '0,0,0 8,0,0' --stroke --radius 1e-9 "
+      "--strength 2",
+      2, "larger --radius");
+}
+
+TEST_F(TerrainActions, SculptKeepsItsEditsInAFile) {
+  const std::string sculpted = "sculpt --brush raise --at 4,2,0 --radius 3 --strength 2";
+  const Json direct = json("read plane.asc ! " + sculpted + " --edits a.edits ! info --json");
+  const Json again = json("read plane.asc ! terrain --edits a.edits ! info --json");
+  EXPECT_EQ(again["hash"], direct["hash"]);
+  EXPECT_NE(direct["hash"], json("read plane.asc ! info --json")["hash"]);
+  expectRefusal("read hole.asc ! terrain --edits a.edits", 3, "other heights");
+  expectRefusal("read plane.asc ! terrain --edits plane.asc", 3, "no file of terrain edits");
+  expectRefusal("read plane.asc ! terrain --edits none.edits", 6, "none.edits");
+}
+
 TEST_F(TerrainActions, WriteKeepsWhatTheFormatHolds) {
   ASSERT_EQ(levelsmith("read hole.asc ! write again.asc").code, 0);
   EXPECT_EQ(json("read again.asc ! info --json")["hash"],

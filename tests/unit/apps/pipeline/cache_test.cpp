@@ -134,6 +134,22 @@ TEST_F(CacheRun, DependsOnTheContentsOfFiles) {
   EXPECT_LE(ran(), 3u);
 }
 
+TEST_F(CacheRun, KnowsThatAHeaderHasItsNumbersInAnotherFile) {
+  ASSERT_EQ(
+      shell("printf 'NDims = 3\\nDimSize = 2 2 2\\nElementType = MET_UCHAR\\n"
+            "ElementDataFile = a.raw\\n' > a.mhd && printf '\\1\\2\\3\\4\\5\\6\\7\\10' > a.raw")
+          .code,
+      0);
+  const std::string info = "--cache c read a.mhd ! info --json";
+  const Outcome first = levelsmith(info);
+  ASSERT_EQ(first.code, 0) << first.err;
+  ASSERT_EQ(shell("printf '\\11\\2\\3\\4\\5\\6\\7\\10' > a.raw").code, 0);
+  const Outcome second = levelsmith(info);
+  EXPECT_EQ(second.code, 0) << second.err;
+  EXPECT_NE(second.out, first.out);
+  EXPECT_EQ(second.out, levelsmith("read a.mhd ! info --json").out);
+}
+
 TEST_F(CacheRun, DistinguishesAFileFromItsLaterContents) {
   const std::string ball = "sphere --radius 1 --voxel 0.1 ! write a.vdb",
                     box = "box --size 1,2,3 --voxel 0.1 ! write a.vdb",
