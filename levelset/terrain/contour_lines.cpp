@@ -6,14 +6,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <unordered_map>
+#include <utility>
 
 #include "levelset/error.h"
 #include "levelset/memory/memory_limit.h"
-#include "levelset/progress_gate.h"
+#include "levelset/mix_hash.h"
 #include "levelset/terrain/ground_triangles.h"
 
 namespace levelset {
 namespace {
+
+/// Rows of cells whose pieces are found at once, by several threads.
+constexpr int kRowsAtOnce = 16;
 
 /// An edge of the grid: twice the index of its sample of least x and y, plus 1 for an edge along y.
 using ContourEdge = std::uint64_t;
@@ -100,59 +106,196 @@ class ContourCells {
   const std::vector<double>& heights_;
 };
 
-/// Joins the pieces of one height to lines.
+/// A line that grows at both ends.
+struct GrowingLine {
+  std::size_t level = 0;
+  ContourEdge from = 0, to = 0;                   // edges of its ends
+  bool isBeginFinal = false, isEndFinal = false;  // no later piece continues it there
+  std::vector<Imath::V2d> front, back;            // points: `front` from its last one, then `back`
+
+  [[nodiscard]] std::size_t size() const { return front.size() + back.size(); }
+  void append(const Imath::V2d& point) {
+    const Imath::V2d* last = !back.empty() ? &back.back() : front.empty() ? nullptr : &front[0];
+    if (!last || *last != point) back.push_back(point);
+  }
+  void prepend(const Imath::V2d& point) {
+    const Imath::V2d* first = !front.empty() ? &front.back() : back.empty() ? nullptr : &back[0];
+    if (!first || *first != point) front.push_back(point);
+  }
+  /// Takes the points of a line that begins at the last point of this one.
+  void appendLine(const GrowingLine& next) {
+    for (auto point = next.front.rbegin(); point != next.front.rend(); ++point) append(*point);
+    for (const Imath::V2d& point : next.back) append(point);
+  }
+  /// Takes the points of a line that ends at the first point of this one.
+  void prependLine(const GrowingLine& previous) {
+    for (auto point = previous.back.rbegin(); point != previous.back.rend(); ++point)
+      prepend(*point);
+    for (const Imath::V2d& point : previous.front) prepend(point);
+  }
+};
+
+/// Joins pieces to lines while it passes from row to row. A line is complete when none of its ends
+/// can continue in a later row.
 class LineJoiner {
  public:
-  LineJoiner(const ContourCells& cells, double height, std::vector<ContourPiece> pieces)
-      : cells_(cells), height_(height), pieces_(std::move(pieces)) {}
+  LineJoiner(const ContourCells& cells, const HeightField& field,
+             const std::vector<double>& heights)
+      : cells_(cells), heights_(heights), width_(static_cast<std::size_t>(field.columns)) {}
 
-  std::vector<ContourLine> joined() {
-    std::sort(pieces_.begin(), pieces_.end(),
-              [](const ContourPiece& a, const ContourPiece& b) { return a.from < b.from; });
-    used_.assign(pieces_.size(), 0);
-    std::vector<char> isContinued(pieces_.size(), 0);  // another piece ends where this one begins
-    for (const ContourPiece& piece : pieces_)
-      if (const std::size_t next = find(piece.to); next < pieces_.size()) isContinued[next] = 1;
-    std::vector<ContourLine> lines;
-    for (std::size_t n = 0; n < pieces_.size(); ++n)
-      if (!isContinued[n]) follow(n, false, lines);
-    for (std::size_t n = 0; n < pieces_.size(); ++n)
-      if (!used_[n]) follow(n, true, lines);
-    return lines;
+  /// Adds a piece of a row of cells, after all pieces of the rows below.
+  void add(const ContourPiece& piece, int row) {
+    const std::size_t before = take(endsAt(piece.from, row), piece.from, piece.level),
+                      after = take(beginsAt(piece.to, row), piece.to, piece.level);
+    if (before != kNoLine && before == after) return complete(before, true);
+    const double height = heights_[piece.level];
+    std::size_t line = 0;
+    if (before != kNoLine && after != kNoLine) {
+      line = join(before, after, row);
+      if (lines_[line].isBeginFinal && lines_[line].isEndFinal) complete(line, false);
+    } else if (before != kNoLine) {
+      line = before;
+      lines_[line].append(cells_.crossing(piece.to, height));
+      ++points_;
+    } else if (after != kNoLine) {
+      line = after;
+      lines_[line].prepend(cells_.crossing(piece.from, height));
+      ++points_;
+    } else {
+      line = newLine(piece.level);
+      lines_[line].append(cells_.crossing(piece.from, height));
+      lines_[line].append(cells_.crossing(piece.to, height));
+      points_ += 2;
+    }
+    if (before == kNoLine) {
+      lines_[line].from = piece.from;
+      beginsAt(piece.from, row)[{piece.from, piece.level}] = line;
+    }
+    if (after == kNoLine) {
+      lines_[line].to = piece.to;
+      endsAt(piece.to, row)[{piece.to, piece.level}] = line;
+    }
+  }
+
+  /// Ends a row: only the ends at its upper edges may continue.
+  void endRow() {
+    for (const auto& [at, line] : begins_[0]) lines_[line].isBeginFinal = true;
+    for (const auto& [at, line] : ends_[0]) lines_[line].isEndFinal = true;
+    for (const auto* ends : {&begins_[0], &ends_[0]})
+      for (const auto& [at, line] : *ends)
+        if (lines_[line].isBeginFinal && lines_[line].isEndFinal && lines_[line].size() > 0)
+          complete(line, false);
+    begins_[0].clear();
+    ends_[0].clear();
+    std::swap(begins_[0], begins_[1]);
+    std::swap(ends_[0], ends_[1]);
+  }
+
+  /// Passes the complete lines on, in an order that depends on the heights only.
+  template <typename Sink>
+  void passOn(const Sink& sink) {
+    std::sort(complete_.begin(), complete_.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (auto& [number, line] : complete_) sink(std::move(line));
+    complete_.clear();
+  }
+
+  /// Memory of the lines that are not passed on, bytes.
+  [[nodiscard]] double memoryUse() const {
+    // Vectors grow by a half or more, and an entry of a map takes about 64 bytes.
+    return 2.0 * sizeof(Imath::V2d) * static_cast<double>(points_) +
+           64.0 * static_cast<double>(begins_[0].size() + begins_[1].size() + ends_[0].size() +
+                                      ends_[1].size()) +
+           static_cast<double>(lines_.size() * sizeof(GrowingLine));
   }
 
  private:
-  /// Index of the piece that begins at an edge; the number of pieces if there is none.
-  [[nodiscard]] std::size_t find(ContourEdge edge) const {
-    const auto found =
-        std::lower_bound(pieces_.begin(), pieces_.end(), edge,
-                         [](const ContourPiece& piece, ContourEdge at) { return piece.from < at; });
-    return found != pieces_.end() && found->from == edge
-               ? static_cast<std::size_t>(found - pieces_.begin())
-               : pieces_.size();
+  static constexpr std::size_t kNoLine = std::numeric_limits<std::size_t>::max();
+  struct End {
+    ContourEdge edge;
+    std::size_t level;
+    bool operator==(const End&) const = default;
+  };
+  struct HashEnd {
+    std::size_t operator()(const End& end) const { return mixHash(end.edge, end.level); }
+  };
+  using Ends = std::unordered_map<End, std::size_t, HashEnd>;
+
+  /// 1 for the upper edges of a row of cells, which the next row has, too; 0 for its other edges.
+  [[nodiscard]] std::size_t groupOf(ContourEdge edge, int row) const {
+    return edge % 2 == 0 && edge / 2 >= (static_cast<std::size_t>(row) + 1) * width_;
+  }
+  Ends& beginsAt(ContourEdge edge, int row) { return begins_[groupOf(edge, row)]; }
+  Ends& endsAt(ContourEdge edge, int row) { return ends_[groupOf(edge, row)]; }
+
+  static std::size_t take(Ends& ends, ContourEdge edge, std::size_t level) {
+    const auto found = ends.find({edge, level});
+    if (found == ends.end()) return kNoLine;
+    const std::size_t line = found->second;
+    ends.erase(found);
+    return line;
   }
 
-  void follow(std::size_t first, bool isClosed, std::vector<ContourLine>& lines) {
-    ContourLine line{.height = height_, .isClosed = isClosed};
-    const auto add = [&](ContourEdge edge) {
-      const Imath::V2d point = cells_.crossing(edge, height_);
-      if (line.points.empty() || line.points.back() != point) line.points.push_back(point);
-    };
-    add(pieces_[first].from);
-    for (std::size_t n = first; n < pieces_.size() && !used_[n];) {
-      used_[n] = 1;
-      add(pieces_[n].to);
-      n = find(pieces_[n].to);
+  std::size_t newLine(std::size_t level) {
+    std::size_t line = lines_.size();
+    if (unused_.empty()) {
+      lines_.emplace_back();
+      numbers_.push_back(0);
+    } else {
+      line = unused_.back();
+      unused_.pop_back();
     }
-    while (isClosed && line.points.size() > 1 && line.points.back() == line.points.front())
-      line.points.pop_back();
-    if (line.points.size() > 1) lines.push_back(std::move(line));
+    lines_[line].level = level;
+    numbers_[line] = count_++;
+    return line;
+  }
+
+  void drop(std::size_t line) {
+    lines_[line] = GrowingLine();
+    unused_.push_back(line);
+  }
+
+  /// Joins two lines: the end of the first one is the begin of the second one. The shorter one is
+  /// copied, so that a point moves at most log n times.
+  std::size_t join(std::size_t first, std::size_t second, int row) {
+    GrowingLine &a = lines_[first], &b = lines_[second];
+    if (a.size() >= b.size()) {
+      a.appendLine(b);
+      a.to = b.to;
+      a.isEndFinal = b.isEndFinal;
+      if (!a.isEndFinal) endsAt(a.to, row)[{a.to, a.level}] = first;
+      drop(second);
+      return first;
+    }
+    b.prependLine(a);
+    b.from = a.from;
+    b.isBeginFinal = a.isBeginFinal;
+    if (!b.isBeginFinal) beginsAt(b.from, row)[{b.from, b.level}] = second;
+    drop(first);
+    return second;
+  }
+
+  void complete(std::size_t n, bool isClosed) {
+    GrowingLine& line = lines_[n];
+    points_ -= line.size();
+    ContourLine whole{.height = heights_[line.level], .isClosed = isClosed};
+    whole.points.reserve(line.size());
+    whole.points.assign(line.front.rbegin(), line.front.rend());
+    whole.points.insert(whole.points.end(), line.back.begin(), line.back.end());
+    while (isClosed && whole.points.size() > 1 && whole.points.back() == whole.points.front())
+      whole.points.pop_back();
+    if (whole.points.size() > 1) complete_.emplace_back(numbers_[n], std::move(whole));
+    drop(n);
   }
 
   const ContourCells& cells_;
-  double height_;
-  std::vector<ContourPiece> pieces_;
-  std::vector<char> used_;
+  const std::vector<double>& heights_;
+  std::size_t width_;
+  std::vector<GrowingLine> lines_;
+  std::vector<std::size_t> numbers_, unused_;
+  std::size_t count_ = 0, points_ = 0;
+  std::array<Ends, 2> begins_, ends_;  // by groupOf()
+  std::vector<std::pair<std::size_t, ContourLine>> complete_;
 };
 
 }  // namespace
@@ -184,8 +327,9 @@ std::vector<double> contourHeights(const HeightField& field, double interval, do
   return heights;
 }
 
-std::vector<ContourLine> contourLines(const HeightField& field, const std::vector<double>& heights,
-                                      const ContourOptions& options) {
+void forEachContourLine(const HeightField& field, const std::vector<double>& heights,
+                        const std::function<void(ContourLine)>& take,
+                        const ContourOptions& options) {
   requireHeights(field);
   for (std::size_t n = 0; n < heights.size(); ++n)
     if (!std::isfinite(heights[n]) || (n > 0 && heights[n] <= heights[n - 1]))
@@ -194,42 +338,49 @@ std::vector<ContourLine> contourLines(const HeightField& field, const std::vecto
           "it; give finite heights in ascending order",
           n + 1, heights[n]));
   const ContourCells cells(field, heights);
-  const int rows = std::max(0, field.rows - 1);
-  std::vector<std::size_t> counts(static_cast<std::size_t>(rows), 0);
-  tbb::parallel_for(0, rows, [&](int row) {
-    cells.forRow(row, [&](const ContourPiece&) { ++counts[static_cast<std::size_t>(row)]; });
-  });
-  std::size_t total = 0;
-  for (const std::size_t count : counts) total += count;
-  // Each piece is held twice, and its point in the line and its growth take 32 bytes.
-  requireMemory(static_cast<double>(total) * (2.0 * sizeof(ContourPiece) + 32),
-                memoryLeft(memoryLimit(options.maxMemory)));
-  report(options.progress, 0.2);
-
-  std::vector<std::vector<ContourPiece>> byRow(static_cast<std::size_t>(rows));
-  tbb::parallel_for(0, rows, [&](int row) {
-    std::vector<ContourPiece>& pieces = byRow[static_cast<std::size_t>(row)];
-    pieces.reserve(counts[static_cast<std::size_t>(row)]);
-    cells.forRow(row, [&](const ContourPiece& piece) { pieces.push_back(piece); });
-  });
-  std::vector<std::vector<ContourPiece>> byHeight(heights.size());
-  for (std::vector<ContourPiece>& pieces : byRow) {
-    for (const ContourPiece& piece : pieces) byHeight[piece.level].push_back(piece);
-    std::vector<ContourPiece>().swap(pieces);
+  LineJoiner joiner(cells, field, heights);
+  const std::size_t left = memoryLeft(memoryLimit(options.maxMemory));
+  const int rows = field.rows - 1;
+  std::vector<std::vector<ContourPiece>> pieces(kRowsAtOnce);
+  for (int first = 0; first < rows; first += kRowsAtOnce) {
+    const int count = std::min(kRowsAtOnce, rows - first);
+    tbb::parallel_for(0, count, [&](int n) {
+      std::vector<ContourPiece>& found = pieces[static_cast<std::size_t>(n)];
+      found.clear();
+      cells.forRow(first + n, [&](const ContourPiece& piece) { found.push_back(piece); });
+    });
+    double pieceBytes = 0;
+    for (int n = 0; n < count; ++n) {
+      const std::vector<ContourPiece>& found = pieces[static_cast<std::size_t>(n)];
+      pieceBytes += static_cast<double>(found.capacity() * sizeof(ContourPiece));
+      for (const ContourPiece& piece : found) joiner.add(piece, first + n);
+      joiner.endRow();
+      joiner.passOn(take);
+    }
+    requireMemory(joiner.memoryUse() + pieceBytes, left);
+    report(options.progress, static_cast<double>(first + count) / rows);
   }
-  report(options.progress, 0.5);
-
-  std::vector<std::vector<ContourLine>> linesOf(heights.size());
-  const Progress joining = subProgress(options.progress, 0.5, 1);
-  ProgressGate gate(joining, heights.size());
-  tbb::parallel_for(std::size_t{0}, heights.size(), [&](std::size_t n) {
-    linesOf[n] = LineJoiner(cells, heights[n], std::move(byHeight[n])).joined();
-    gate.advance(1);
-  });
-  std::vector<ContourLine> lines;
-  for (std::vector<ContourLine>& some : linesOf)
-    for (ContourLine& line : some) lines.push_back(std::move(line));
+  joiner.endRow();
+  joiner.passOn(take);
   report(options.progress, 1);
+}
+
+std::vector<ContourLine> contourLines(const HeightField& field, const std::vector<double>& heights,
+                                      const ContourOptions& options) {
+  const std::size_t left = memoryLeft(memoryLimit(options.maxMemory));
+  double bytes = 0;
+  std::vector<ContourLine> lines;
+  forEachContourLine(
+      field, heights,
+      [&](ContourLine line) {
+        bytes +=
+            2.0 * sizeof line + static_cast<double>(line.points.size() * sizeof line.points[0]);
+        requireMemory(bytes, left);
+        lines.push_back(std::move(line));
+      },
+      options);
+  std::stable_sort(lines.begin(), lines.end(),
+                   [](const ContourLine& a, const ContourLine& b) { return a.height < b.height; });
   return lines;
 }
 

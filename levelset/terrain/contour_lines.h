@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "levelset/terrain/height_field.h"
@@ -22,6 +23,14 @@ struct ContourOptions {
 /// @throws UsageError for an interval that is not positive, or more than 100,000 heights
 [[nodiscard]] std::vector<double> contourHeights(const HeightField& field, double interval,
                                                  double base = 0);
+
+/// Finds the lines of equal height, and passes each one on when it is complete. So memory is that
+/// of the lines that are open in a row of cells.
+/// @param take  receives the lines, in the same order for any number of threads
+/// @throws as contourLines(), and what `take` throws
+void forEachContourLine(const HeightField& field, const std::vector<double>& heights,
+                        const std::function<void(ContourLine)>& take,
+                        const ContourOptions& options = {});
 
 /// Finds the lines of equal height, with higher ground on their left. A line crosses the edges of
 /// cells where linear interpolation gives its height. Cells on both sides of an edge share that

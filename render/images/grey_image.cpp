@@ -12,6 +12,7 @@
 #include <string>
 
 #include "levelset/error.h"
+#include "levelset/file_target.h"
 
 namespace render {
 namespace {
@@ -69,6 +70,45 @@ struct PngReader {
  private:
   static void fail(png_structp png, png_const_charp message) {
     static_cast<PngReader*>(png_get_error_ptr(png))->error = message;
+    png_longjmp(png, 1);
+  }
+  static void ignore(png_structp, png_const_charp) {}
+};
+
+/// State of libpng while it writes; errors are those of PngReader.
+struct PngWriter {
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  std::string error;
+
+  PngWriter() {
+    png = png_create_write_struct(PNG_LIBPNG_VER_STRING, this, &fail, &ignore);
+    if (png) info = png_create_info_struct(png);
+  }
+  ~PngWriter() { png_destroy_write_struct(&png, &info); }
+  PngWriter(const PngWriter&) = delete;
+  PngWriter& operator=(const PngWriter&) = delete;
+
+  bool write(std::FILE* file, int width, int height, const std::uint8_t* topRow,
+             std::ptrdiff_t rowStep, bool zeroIsClear) {
+    if (setjmp(png_jmpbuf(png))) return false;
+    png_init_io(png, file);
+    png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
+                 PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    // The grey of pictures with smooth shades is near that of the pixel above.
+    png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
+    const png_color_16 clear = {};
+    if (zeroIsClear) png_set_tRNS(png, info, nullptr, 1, &clear);
+    png_write_info(png, info);
+    for (int row = 0; row < height; ++row) png_write_row(png, topRow + row * rowStep);
+    png_write_end(png, nullptr);
+    return true;
+  }
+
+ private:
+  static void fail(png_structp png, png_const_charp message) {
+    static_cast<PngWriter*>(png_get_error_ptr(png))->error = message;
     png_longjmp(png, 1);
   }
   static void ignore(png_structp, png_const_charp) {}
@@ -170,6 +210,27 @@ GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) 
     if (channels == 2) image.alpha[n] = sampleAt(rows[n / width], first + 1, isDeep);
   }
   return image;
+}
+
+void writeGreyPng(const std::filesystem::path& path, int width, int height,
+                  const std::uint8_t* topRow, std::ptrdiff_t rowStep, bool zeroIsClear) {
+  levelset::FileTarget target(path);
+  const auto fail = [&](const std::string& why) {
+    throw IoError(
+        fmt::format("{}: {}; free some space or choose another folder", path.string(), why));
+  };
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(target.path().c_str(), "wb"),
+                                                       &std::fclose);
+  if (!file) fail(std::strerror(errno));
+  {
+    PngWriter writer;
+    if (!writer.png || !writer.info)
+      throw levelset::ResourceLimit(
+          fmt::format("libpng cannot allocate memory to write {}; free memory", path.string()));
+    if (!writer.write(file.get(), width, height, topRow, rowStep, zeroIsClear)) fail(writer.error);
+  }
+  if (std::fclose(file.release()) != 0) fail(std::strerror(errno));
+  target.commit();
 }
 
 }  // namespace render

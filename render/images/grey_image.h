@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 
@@ -22,6 +23,16 @@ struct GreyImage {
 /// @throws ResourceLimit, before memory is allocated, for a picture that exceeds `maxMemory`
 [[nodiscard]] GreyImage readGreyPng(const std::filesystem::path& path,
                                     std::size_t maxMemory = levelset::kNoMemoryLimit);
+
+/// Writes a grey PNG of 8 bits.
+/// @param topRow      first pixel of the top row
+/// @param rowStep     distance from a row to the one below, pixels; negative if the bottom row is
+/// the
+///                    first one in memory
+/// @param zeroIsClear pixels of 0 are transparent
+/// @throws IoError when the file cannot be written; an old file of that name stays then
+void writeGreyPng(const std::filesystem::path& path, int width, int height,
+                  const std::uint8_t* topRow, std::ptrdiff_t rowStep, bool zeroIsClear);
 
 /// Checks that the chunks of a PNG lie within the file, because libpng allocates memory for any
 /// chunk size that a file claims. Does nothing for a pipe.

@@ -2,6 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cstddef>
+
 #include "levelset/error.h"
 #include "levelset/terrain/files/height_field_file.h"
 #include "render/images/grey_image.h"
@@ -37,17 +40,11 @@ levelset::HeightField readTerrainPicture(const std::filesystem::path& file, std:
 }
 
 void writeTerrainPicture(const std::filesystem::path& file, const levelset::HeightField& terrain,
-                         const std::vector<std::uint8_t>& greys, std::size_t maxMemory) {
-  levelset::requireMemory(static_cast<double>(greys.size()) * 8, maxMemory);
-  std::vector<std::uint8_t> colours;
-  colours.reserve(greys.size() * 4);
-  for (int row = terrain.rows - 1; row >= 0; --row)
-    for (int column = 0; column < terrain.columns; ++column) {
-      const std::uint8_t grey = greys[terrain.index(column, row)];
-      const std::uint8_t alpha = grey == 0 ? 0 : 255;
-      colours.insert(colours.end(), {grey, grey, grey, alpha});
-    }
-  render::writePng(file, terrain.columns, terrain.rows, colours);
+                         const std::vector<std::uint8_t>& greys) {
+  const std::ptrdiff_t width = terrain.columns;
+  render::writeGreyPng(file, terrain.columns, terrain.rows,
+                       greys.data() + (terrain.rows - 1) * width, -width,
+                       std::find(greys.begin(), greys.end(), 0) != greys.end());
 }
 
 }  // namespace pipeline

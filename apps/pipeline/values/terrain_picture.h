@@ -24,6 +24,6 @@ namespace pipeline {
 /// 0 are transparent.
 /// @throws levelset::IoError, levelset::ResourceLimit
 void writeTerrainPicture(const std::filesystem::path& file, const levelset::HeightField& terrain,
-                         const std::vector<std::uint8_t>& greys, std::size_t maxMemory);
+                         const std::vector<std::uint8_t>& greys);
 
 }  // namespace pipeline

@@ -48,6 +48,8 @@ class HeightNumbers {
     return text_.substr(begin, at_ - begin);
   }
   [[nodiscard]] std::size_t line() const { return line_ + 1; }
+  /// Bytes behind the last word.
+  [[nodiscard]] std::size_t left() const { return text_.size() - at_; }
 
  private:
   std::string_view text_;
@@ -56,7 +58,7 @@ class HeightNumbers {
 
 HeightField readAsciiGrid(const std::filesystem::path& path,
                           const ReadHeightFieldOptions& options) {
-  const MappedFile file(path, options.maxMemory);
+  MappedFile file(path, options.maxMemory);
   GridHeader header(inputName(path));
   const std::string_view text = header.take(file.view());
   HeightField field = header.grid();
@@ -95,6 +97,7 @@ HeightField readAsciiGrid(const std::filesystem::path& path,
                                         "with the number of NODATA_value",
                                         numbers.line(), word.substr(0, 40)));
     }
+    file.release(file.view().size() - numbers.left());
     report(options.progress, static_cast<double>(fromTop + 1) / field.rows);
   }
   if (const std::string_view word = numbers.next(); !word.empty())

@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <iterator>
 #include <string>
+#include <utility>
 
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/registry/invocation.h"
-#include "apps/pipeline/values/text_file.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/terrain/contour_lines.h"
@@ -29,73 +32,116 @@ std::string contourFormat(const Invocation& in) {
   return format == ".geojson" || format == ".svg" ? format.substr(1) : std::string();
 }
 
-/// Lines as features of GeoJSON. Closed lines end with their first point.
-std::string geoJson(const std::vector<ContourLine>& lines) {
-  std::string text = "{\"type\": \"FeatureCollection\", \"features\": [";
-  const auto out = std::back_inserter(text);
-  const char* between = "\n";
-  for (const ContourLine& line : lines) {
+/// Writes lines to a file one by one, so that memory does not grow with their number.
+class ContourWriter {
+ public:
+  ContourWriter(const std::filesystem::path& path, bool isSvg, const HeightField& terrain)
+      : path_(path), target_(path), isSvg_(isSvg) {
+    file_ = std::fopen(target_.path().c_str(), "wb");
+    if (!file_) fail();
+    const Imath::V2d low = terrain.origin,
+                     high = terrain.position(terrain.columns - 1, terrain.rows - 1);
+    corner_ = {low.x, high.y};
+    scale_ = 1000 / std::max({high.x - low.x, high.y - low.y, 1e-300});
+    if (isSvg)
+      text_ = fmt::format(
+          "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.2f} {:.2f}\">\n"
+          "<g fill=\"none\" stroke=\"black\" stroke-width=\"1\">\n",
+          (high.x - low.x) * scale_, (high.y - low.y) * scale_);
+    else
+      text_ = "{\"type\": \"FeatureCollection\", \"features\": [";
+  }
+  ~ContourWriter() {
+    if (file_) std::fclose(file_);
+  }
+  ContourWriter(const ContourWriter&) = delete;
+  ContourWriter& operator=(const ContourWriter&) = delete;
+
+  void add(const ContourLine& line) {
+    if (isSvg_)
+      addSvg(line);
+    else
+      addJson(line);
+    ++lines;
+    points += line.points.size();
+    closed += line.isClosed;
+    if (text_.size() > kBuffer) flush();
+  }
+
+  void finish() {
+    text_ += isSvg_ ? "</g>\n</svg>\n" : "\n]}\n";
+    flush();
+    if (std::fclose(std::exchange(file_, nullptr)) != 0) fail();
+    target_.commit();
+  }
+
+  std::size_t lines = 0, points = 0, closed = 0;
+
+ private:
+  static constexpr std::size_t kBuffer = std::size_t{1} << 20;
+
+  [[noreturn]] void fail() const {
+    throw levelset::IoError(fmt::format("{}: {}; free some space or choose another folder",
+                                        path_.string(), std::strerror(errno)));
+  }
+  void flush() {
+    if (std::fwrite(text_.data(), 1, text_.size(), file_) != text_.size()) fail();
+    text_.clear();
+  }
+
+  /// Adds a feature of GeoJSON. A closed line ends with its first point.
+  void addJson(const ContourLine& line) {
+    const auto out = std::back_inserter(text_);
     fmt::format_to(out,
                    "{}{{\"type\": \"Feature\", \"properties\": {{\"height\": {}}}, \"geometry\": "
                    "{{\"type\": \"LineString\", \"coordinates\": [",
-                   between, line.height);
-    between = ",\n";
+                   lines == 0 ? "\n" : ",\n", line.height);
     const auto add = [&](const Imath::V2d& p, bool isFirst) {
       fmt::format_to(out, "{}[{},{},{}]", isFirst ? "" : ",", p.x, p.y, line.height);
     };
     for (std::size_t n = 0; n < line.points.size(); ++n) add(line.points[n], n == 0);
     if (line.isClosed) add(line.points[0], false);
-    text += "]}}";
+    text_ += "]}}";
   }
-  return text + "\n]}\n";
-}
 
-/// Lines as a picture of 1000 units on its longer side, with north at the top.
-std::string contourSvg(const std::vector<ContourLine>& lines, const HeightField& terrain) {
-  const Imath::V2d low = terrain.origin,
-                   high = terrain.position(terrain.columns - 1, terrain.rows - 1);
-  const Imath::V2d size = high - low;
-  const double scale = 1000 / std::max({size.x, size.y, 1e-300});
-  std::string text = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.2f} {:.2f}\">\n"
-      "<g fill=\"none\" stroke=\"black\" stroke-width=\"1\">\n",
-      size.x * scale, size.y * scale);
-  const auto out = std::back_inserter(text);
-  for (const ContourLine& line : lines) {
+  /// Adds a path in a picture of 1000 units on its longer side, with north at the top.
+  void addSvg(const ContourLine& line) {
+    const auto out = std::back_inserter(text_);
     fmt::format_to(out, "<path data-height=\"{}\" d=\"", line.height);
     for (std::size_t n = 0; n < line.points.size(); ++n) {
       const Imath::V2d p = line.points[n];
-      fmt::format_to(out, "{}{:.2f} {:.2f}", n == 0 ? "M" : "L", (p.x - low.x) * scale,
-                     (high.y - p.y) * scale);
+      fmt::format_to(out, "{}{:.2f} {:.2f}", n == 0 ? "M" : "L", (p.x - corner_.x) * scale_,
+                     (corner_.y - p.y) * scale_);
     }
-    text += line.isClosed ? "Z\"/>\n" : "\"/>\n";
+    text_ += line.isClosed ? "Z\"/>\n" : "\"/>\n";
   }
-  return text + "</g>\n</svg>\n";
-}
+
+  std::filesystem::path path_;
+  levelset::FileTarget target_;
+  std::FILE* file_ = nullptr;
+  bool isSvg_;
+  Imath::V2d corner_;
+  double scale_ = 1;
+  std::string text_;
+};
 
 Value drawContours(Invocation& in) {
   const HeightField& terrain = in.operands[0].terrain();
   const std::vector<double> heights =
       levelset::contourHeights(terrain, in.number("interval"), in.number("base"));
-  const std::vector<ContourLine> lines = levelset::contourLines(
-      terrain, heights, {.maxMemory = in.maxMemory, .progress = in.progress});
-  std::size_t points = 0, closed = 0;
-  for (const ContourLine& line : lines) {
-    points += line.points.size();
-    closed += line.isClosed;
-  }
-  // A point takes up to 75 letters.
-  levelset::requireMemory(static_cast<double>(points) * 100, in.maxMemory);
-  writeText(in.text("file"),
-            contourFormat(in) == "svg" ? contourSvg(lines, terrain) : geoJson(lines), "contours");
+  ContourWriter writer(in.text("file"), contourFormat(in) == "svg", terrain);
+  levelset::forEachContourLine(terrain, heights, [&](const ContourLine& line) { writer.add(line); },
+                               {.maxMemory = in.maxMemory, .progress = in.progress});
+  writer.finish();
   in.notes.detailsJson = Json{
       {"heights", heights.size()},
-      {"lines", lines.size()},
-      {"closed", closed},
-      {"points", points}}.dump();
+      {"lines", writer.lines},
+      {"closed", writer.closed},
+      {"points",
+       writer.points}}.dump();
   in.notes.notes.push_back(
-      fmt::format("contours: {} lines, {} of them closed", lines.size(), closed));
-  if (lines.empty())
+      fmt::format("contours: {} lines, {} of them closed", writer.lines, writer.closed));
+  if (writer.lines == 0)
     in.notes.warnings.push_back(fmt::format(
         "contours: no line crosses the terrain, so {} has none; give a smaller --interval or "
         "another --base",

@@ -147,7 +147,7 @@ Value drawHillshade(Invocation& in) {
                                     .edges = in.flag("edges"),
                                     .maxMemory = in.maxMemory,
                                     .progress = in.progress});
-  writeTerrainPicture(in.text("file"), terrain, shades, in.maxMemory);
+  writeTerrainPicture(in.text("file"), terrain, shades);
   return in.operands[0];
 }
 
