@@ -8,7 +8,7 @@
 #include "levelset/terrain/sculpt/pyramid_errors.h"
 
 namespace levelset {
-namespace {
+namespace terrain {
 
 /// Heights of a rectangle: those before a change, or after it was undone those behind it.
 struct HeightChange {
@@ -36,14 +36,14 @@ struct HeightChange {
 
 using Stroke = std::vector<HeightChange>;
 
-std::size_t bytesOf(const Stroke& stroke) {
+inline std::size_t bytesOf(const Stroke& stroke) {
   std::size_t bytes = 0;
   for (const HeightChange& change : stroke)
     bytes += sizeof change + change.heights.size() * sizeof(float);
   return bytes;
 }
 
-SampleRange united(const SampleRange& a, const SampleRange& b) {
+inline SampleRange united(const SampleRange& a, const SampleRange& b) {
   if (a.isEmpty()) return b;
   if (b.isEmpty()) return a;
   return {.firstColumn = std::min(a.firstColumn, b.firstColumn),
@@ -52,7 +52,7 @@ SampleRange united(const SampleRange& a, const SampleRange& b) {
           .lastRow = std::max(a.lastRow, b.lastRow)};
 }
 
-}  // namespace
+}  // namespace terrain
 
 struct SculptedGround::State {
   State(HeightField given, const SculptOptions& options)
@@ -62,23 +62,23 @@ struct SculptedGround::State {
         maxMemory(options.maxMemory) {}
 
   /// Exchanges the heights of a stroke. @param isForward  the first change goes first
-  SampleRange exchange(Stroke& stroke, bool isForward) {
+  SampleRange exchange(terrain::Stroke& stroke, bool isForward) {
     if (isForward)
       for (auto change = stroke.begin(); change != stroke.end(); ++change) change->swapWith(field);
     else
       for (auto change = stroke.rbegin(); change != stroke.rend(); ++change)
         change->swapWith(field);
     SampleRange changed;
-    for (const HeightChange& change : stroke) {
+    for (const terrain::HeightChange& change : stroke) {
       errors->update(field, change.range);
-      changed = united(changed, change.range);
+      changed = terrain::united(changed, change.range);
     }
     return changed;
   }
 
   void limitUndo() {
     while (undoBytes > undoMemory && done.size() > 1) {
-      undoBytes -= bytesOf(done.front());
+      undoBytes -= terrain::bytesOf(done.front());
       done.pop_front();
     }
   }
@@ -87,9 +87,9 @@ struct SculptedGround::State {
   GroundChanges changes;
   std::size_t undoMemory, maxMemory;
   std::unique_ptr<terrain::PyramidErrors> errors;
-  std::deque<Stroke> done;
-  std::vector<Stroke> undone;  // the last one is redone first
-  std::size_t undoBytes = 0;   // of the strokes that are done
+  std::deque<terrain::Stroke> done;
+  std::vector<terrain::Stroke> undone;  // the last one is redone first
+  std::size_t undoBytes = 0;            // of the strokes that are done
   bool startsStroke = true;
 };
 
@@ -124,7 +124,7 @@ SampleRange SculptedGround::apply(const BrushDab& dab) {
   requireDab(dab);
   const SampleRange range = dabRange(state_->field, dab);
   if (range.isEmpty()) return range;
-  HeightChange change(state_->field, range);
+  terrain::HeightChange change(state_->field, range);
   applyDab(state_->field, dab, state_->maxMemory);
   if (std::exchange(state_->startsStroke, false)) {
     state_->done.emplace_back();
@@ -151,7 +151,7 @@ SampleRange SculptedGround::undo() {
   state_->startsStroke = true;
   state_->undone.push_back(std::move(state_->done.back()));
   state_->done.pop_back();
-  state_->undoBytes -= bytesOf(state_->undone.back());
+  state_->undoBytes -= terrain::bytesOf(state_->undone.back());
   return state_->exchange(state_->undone.back(), false);
 }
 
@@ -160,7 +160,7 @@ SampleRange SculptedGround::redo() {
   state_->startsStroke = true;
   state_->done.push_back(std::move(state_->undone.back()));
   state_->undone.pop_back();
-  state_->undoBytes += bytesOf(state_->done.back());
+  state_->undoBytes += terrain::bytesOf(state_->done.back());
   return state_->exchange(state_->done.back(), true);
 }
 
