@@ -1,14 +1,17 @@
 #include "render/bezier/bezier_caster.h"
 
+#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <mutex>
 #include <numeric>
 #include <utility>
 
+#include "render/bezier/solid_crossings.h"
 #include "render/bezier/tree_node.h"
 #include "render/bezier/tree_walk.h"
 
@@ -62,7 +65,9 @@ struct BezierCaster::Data {
   std::vector<TreeNode> parts;         ///< in world space
   std::vector<BezierBoxNode> boxes;
   Box3d bounds;
-  double margin = 0;  ///< rounding errors of distances to boxes
+  double margin = 0;                ///< rounding errors of distances to boxes
+  mutable std::once_flag isJudged;  ///< for `refusal`
+  mutable std::string refusal;      ///< BezierCaster::refusalAsSolid()
 
   explicit Data(BezierVolume given, std::size_t maxBytes) : volume(std::move(given)) {
     requireBezierVolume(volume);
@@ -157,6 +162,22 @@ BezierCaster::BezierCaster(BezierVolume volume, std::size_t maxBytes)
 
 const BezierVolume& BezierCaster::volume() const {
   return data_->volume;
+}
+const std::string& BezierCaster::refusalAsSolid() const {
+  std::call_once(data_->isJudged, [&data = *data_] {
+    const std::size_t count = data.volume.patches.size();
+    if (const std::size_t open = findOpenPatch(data.volume); open < count)
+      data.refusal = fmt::format(
+          "its surface is open at patch {}; give a volume whose inside keeps away from its outer "
+          "faces",
+          open + 1);
+    else if (const std::size_t folded = findFoldedPatch(data.volume); folded < count)
+      data.refusal = fmt::format(
+          "its map folds in patch {}, and a ray does not show where the layers end; give a map "
+          "without folds inside the surface",
+          folded + 1);
+  });
+  return data_->refusal;
 }
 const Box3d& BezierCaster::bounds() const {
   return data_->bounds;

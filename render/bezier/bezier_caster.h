@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "levelset/progress.h"
@@ -36,6 +37,10 @@ class BezierCaster {
   [[nodiscard]] std::size_t partCount() const;
   /// Memory of the parts and of the volume, bytes.
   [[nodiscard]] std::size_t bytes() const;
+
+  /// Reason why the volume is no solid that an expression may combine; empty: none is known. The
+  /// first call computes it, from samples (findOpenPatch(), findFoldedPatch()).
+  [[nodiscard]] const std::string& refusalAsSolid() const;
 
   /// First intersection of a ray between its ends.
   [[nodiscard]] std::optional<BezierRoot> firstHit(const Camera::Ray& ray) const;

@@ -11,8 +11,8 @@
 
 namespace render {
 
-/// The surface of a Bézier volume in a scene. It is lit, casts shadows and hides
-/// other parts by depth, but cannot be used in the CSG expression of the scene.
+/// The surface of a Bézier volume in a scene. It is lit, casts shadows and hides other parts by
+/// depth. A closed one may be an operand of the CSG expression of the scene.
 struct BezierPart {
   BezierCaster caster;
   Imath::C3f colour{0.66f, 0.62f, 0.56f};

@@ -180,9 +180,22 @@ void requireRay(const V3d& origin, const V3d& direction) {
 
 }  // namespace
 
+namespace {
+
+/// Crossings of a ray with the operands of the expression: solids, then Bézier volumes.
+struct SceneChanges {
+  std::vector<std::vector<SideChange>> lists;  ///< for each operand; SideChange::t from `moved`
+  std::optional<RayQuery> query;               ///< none when the ray misses all solids
+  double moved = 0;                            ///< distance from the ray's origin, world units
+  double limit = 0;                            ///< end of the search from `moved`, world units
+  std::vector<std::vector<JudgedParts::Crossing>> onBeziers;  ///< for each Bézier operand
+};
+
+}  // namespace
+
 struct EmbreeScene::Impl {
   std::vector<RaySolid> solids;
-  CsgExpression csg;  // uses indices of `solids`
+  CsgExpression csg;  // uses indices of `solids`, then of the operands of `parts`
   MeshRays meshes;
   std::optional<FieldMarch> fields;  // set for a blended scene; then `solids` is empty
   JudgedParts parts;
@@ -203,8 +216,12 @@ struct EmbreeScene::Impl {
                                   double& moved, RTCRay& ray) const;
   /// All crossings of the ray up to the far side of the scene, one list for each solid.
   [[nodiscard]] std::vector<std::vector<SideChange>> allChanges(RayQuery& query, RTCRay ray) const;
-  /// First point, up to `limit` of the query, where the ray enters or leaves the result of `csg`.
-  std::optional<CsgChange> findCsg(RayQuery& query, RTCRay ray) const;
+  /// First point, up to the limit, where the ray enters or leaves the result of `csg`.
+  std::optional<CsgChange> findCsg(const SceneChanges& changes) const;
+  /// Crossings of a ray with all operands of the expression, or with all solids without one.
+  [[nodiscard]] SceneChanges changesOf(const V3d& origin, const V3d& direction, double near,
+                                       double far) const;
+  [[nodiscard]] Hit hitOf(const SceneChanges& all, const CsgChange& change) const;
   /// @pre the direction is finite and not zero
   [[nodiscard]] Hit intersectSolids(const V3d& origin, const V3d& direction, double near,
                                     double far) const;
@@ -264,11 +281,13 @@ void EmbreeScene::Impl::gather(const Scene& source, Filter filter) {
     const double u = a.voxelSize, v = b.voxelSize;
     return u != v ? u < v : a.id < b.id;
   });
-  std::vector<int> numbers(source.solids.size(), -1);
+  std::vector<int> numbers(source.solids.size() + source.beziers.size(), -1);
   for (std::size_t s = 0; s < solids.size(); ++s) {
     solids[s].number = s;
     numbers[solids[s].index] = static_cast<int>(s);
   }
+  for (std::size_t n = 0; n < parts.operandCount(); ++n)
+    numbers[source.solids.size() + parts.operand(n)] = static_cast<int>(solids.size() + n);
   csg = source.csg.renumbered(numbers);
   if (bounds.isEmpty()) return;
   view = EmbreeSpace(bounds);
@@ -321,14 +340,47 @@ std::vector<std::vector<SideChange>> EmbreeScene::Impl::allChanges(RayQuery& que
   return changes;
 }
 
-std::optional<CsgChange> EmbreeScene::Impl::findCsg(RayQuery& query, RTCRay ray) const {
-  std::vector<std::vector<SideChange>> changes = allChanges(query, ray);
+std::optional<CsgChange> EmbreeScene::Impl::findCsg(const SceneChanges& changes) const {
   std::optional<CsgChange> first;
-  walkChanges(csg, changes, [&](const CsgChange& change) {
-    if (change.t <= query.limit) first = change;
+  std::vector<std::vector<SideChange>> lists = changes.lists;
+  walkChanges(csg, lists, [&](const CsgChange& change) {
+    if (change.t <= changes.limit) first = change;
     return false;
   });
   return first;
+}
+
+SceneChanges EmbreeScene::Impl::changesOf(const V3d& origin, const V3d& direction, double near,
+                                          double far) const {
+  SceneChanges all;
+  RTCRay ray;
+  all.query = prepare(origin, direction, near, far, all.moved, ray);
+  if (all.query)
+    all.lists = allChanges(*all.query, ray);
+  else
+    all.moved = 0;
+  all.limit = all.query ? all.query->limit : far;
+  all.lists.resize(solids.size() + parts.operandCount());
+  for (std::size_t n = 0; n < parts.operandCount(); ++n) {
+    all.onBeziers.push_back(parts.operandCrossings(n, {origin, direction, near}));
+    for (const JudgedParts::Crossing& crossing : all.onBeziers.back())
+      all.lists[solids.size() + n].push_back({crossing.hit.distance - all.moved, crossing.enters});
+  }
+  return all;
+}
+
+Hit EmbreeScene::Impl::hitOf(const SceneChanges& all, const CsgChange& change) const {
+  Hit hit;
+  hit.isFlipped = change.isFlipped;
+  if (change.solid < solids.size()) {
+    complete(hit, *all.query, solids[change.solid], all.moved, change.t);
+    return hit;
+  }
+  for (const JudgedParts::Crossing& crossing : all.onBeziers[change.solid - solids.size()])
+    if (crossing.hit.distance - all.moved == change.t) hit = crossing.hit;
+  hit.isFlipped = change.isFlipped;
+  if (hit.isFlipped) hit.normal = hit.facetNormal = -hit.normal;
+  return hit;
 }
 
 void EmbreeScene::Impl::complete(Hit& hit, const RayQuery& query, const RaySolid& solid,
@@ -367,18 +419,16 @@ Hit EmbreeScene::Impl::intersectSolids(const V3d& origin, const V3d& direction, 
     requireRay(origin, direction);
     return fields->intersect(origin, direction, near, far);
   }
+  if (!csg.isEmpty()) {
+    const SceneChanges changes = changesOf(origin, direction, near, far);
+    const auto change = findCsg(changes);
+    return change ? hitOf(changes, *change) : Hit();
+  }
   Hit hit;
   double moved;
   RTCRayHit rayHit;
   auto query = prepare(origin, direction, near, far, moved, rayHit.ray);
   if (!query) return hit;
-  if (!csg.isEmpty()) {
-    if (const auto change = findCsg(*query, rayHit.ray)) {
-      hit.isFlipped = change->isFlipped;
-      complete(hit, *query, solids[change->solid], moved, change->t);
-    }
-    return hit;
-  }
   rayHit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rayHit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(tree.scene, &query->embree, &rayHit);
@@ -431,20 +481,15 @@ std::vector<Hit> EmbreeScene::intersectVisible(const V3d& origin, const V3d& dir
       hits.push_back(onSolid);
     return hits;
   }
-  double moved;
-  RTCRay ray;
-  if (auto query = impl_->prepare(origin, direction, near, far, moved, ray)) {
-    std::vector<std::vector<SideChange>> changes = impl_->allChanges(*query, ray);
-    walkChanges(impl_->csg, changes, [&](const CsgChange& change) {
-      if (change.t > query->limit || !addTransparent(moved + change.t)) return false;
-      Hit hit;
-      hit.isFlipped = change.isFlipped;
-      impl_->complete(hit, *query, impl_->solids[change.solid], moved, change.t);
-      hits.push_back(hit);
-      share *= 1 - hit.opacity;
-      return share >= kLeastTransmittance;
-    });
-  }
+  const SceneChanges changes = impl_->changesOf(origin, direction, near, far);
+  std::vector<std::vector<SideChange>> lists = changes.lists;
+  walkChanges(impl_->csg, lists, [&](const CsgChange& change) {
+    if (change.t > changes.limit || !addTransparent(changes.moved + change.t)) return false;
+    const Hit hit = impl_->hitOf(changes, change);
+    hits.push_back(hit);
+    share *= 1 - hit.opacity;
+    return share >= kLeastTransmittance;
+  });
   if (addTransparent(far) && onOpaque.found) hits.push_back(onOpaque);
   return hits;
 }
@@ -464,11 +509,12 @@ bool EmbreeScene::isOccluded(const V3d& origin, const V3d& direction, double nea
     requireRay(origin, direction);
     return impl_->fields->isOccluded(origin, direction, near, far);
   }
+  if (!impl_->csg.isEmpty())
+    return impl_->findCsg(impl_->changesOf(origin, direction, near, far)).has_value();
   double moved;
   RTCRay ray;
   auto query = impl_->prepare(origin, direction, near, far, moved, ray);
   if (!query) return false;
-  if (!impl_->csg.isEmpty()) return impl_->findCsg(*query, ray).has_value();
   rtcOccluded1(impl_->tree.scene, &query->embree, &ray);
   return ray.tfar < 0;
 }

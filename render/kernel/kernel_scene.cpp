@@ -170,8 +170,13 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
   std::stable_sort(solids_.begin(), solids_.end(), [](const KernelSolid& a, const KernelSolid& b) {
     return std::tie(a.voxelSize, a.id) < std::tie(b.voxelSize, b.id);
   });
-  std::vector<int> numbers(scene.solids.size(), -1);
+  std::vector<int> numbers(scene.solids.size() + beziers_.size(), -1);
   for (std::size_t s = 0; s < solids_.size(); ++s) numbers[solids_[s].index] = static_cast<int>(s);
+  for (std::size_t part = 0; part < beziers_.size(); ++part) {
+    if (!scene.isOperand(part)) continue;
+    numbers[scene.solids.size() + part] = static_cast<int>(operandCount());
+    operands_.push_back(part);
+  }
   csg_ = scene.csg.renumbered(numbers);
   updateView(scene);
 }
@@ -181,6 +186,7 @@ void KernelScene::updateView(const Scene& scene) {
     if (fields_->updateTransforms(scene)) bounds_ = tableBounds_ = scene.bounds();
     return;
   }
+  camera_ = scene.camera;
   near_ = scene.camera.near;
   far_ = scene.camera.farthest();
   bounds_ = meshes_.bounds();
@@ -189,9 +195,14 @@ void KernelScene::updateView(const Scene& scene) {
   for (const BezierPart& part : beziers_) bounds_.extendBy(part.caster.bounds());
   for (const QuadricPart& part : quadrics_) bounds_.extendBy(part.caster.bounds());
   trees_.clear();
-  for (const BezierPart& part : beziers_)
-    trees_.push_back(std::make_shared<const SharedTree>(part.caster.volume(), scene.camera,
-                                                        TreeOptions{.allRoots = part.opacity < 1}));
+  // An operand is crossed beyond the end of the view, too: its last crossing shows if the ray is
+  // inside it.
+  Camera endless = scene.camera;
+  endless.far.reset();
+  for (std::size_t n = 0; n < beziers_.size(); ++n)
+    trees_.push_back(std::make_shared<const SharedTree>(
+        beziers_[n].caster.volume(), isOperand(n) ? endless : scene.camera,
+        TreeOptions{.allRoots = isOperand(n) || beziers_[n].opacity < 1}));
   bezierSolid_ = scene.solids.size() + scene.mapped.size() + (segmented_ ? 1 : 0);
   tableBounds_ = bounds_;
   for (const Extent& extent : extents_) {
@@ -224,9 +235,14 @@ BezierHits KernelScene::castBeziers(const KernelTracer& tracer,
                                     const std::vector<Camera::Ray>& rays,
                                     TreeCounts* counts) const {
   BezierHits result;
-  if (beziers_.empty()) return result;
-  std::vector<SharedTree::Roots> found;
-  for (const auto& tree : trees_) found.push_back(tracer.bezierRoots(*tree, rays, counts));
+  if (operands_.size() == beziers_.size()) return result;
+  std::vector<SharedTree::Roots> found(beziers_.size());
+  for (std::size_t part = 0; part < beziers_.size(); ++part) {
+    if (isOperand(part))
+      found[part].first.assign(rays.size() + 1, 0);
+    else
+      found[part] = tracer.bezierRoots(*trees_[part], rays, counts);
+  }
   result.first.push_back(0);
   std::vector<std::pair<const BezierRoot*, std::size_t>> roots;  // of a ray, with their parts
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -265,10 +281,13 @@ std::vector<Hit> KernelScene::castQuadrics(const KernelTracer& tracer,
   return hits;
 }
 
-PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
+PixelHits KernelScene::castPixels(const KernelTracer& tracer, const PixelBlock& pixels,
+                                  OperandCrossings* operands) const {
   if (csg_.isEmpty()) return castFirst(tracer, pixels);
-  PixelTraversal walk = startTraversal(pixels);
-  return castNext(tracer, walk);
+  PixelTraversal walk = startTraversal(tracer, pixels);
+  PixelHits hits = castNext(tracer, walk);
+  if (operands) *operands = std::move(walk.beziers);
+  return hits;
 }
 
 PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const {
@@ -291,11 +310,27 @@ PixelHits KernelScene::castFirst(const KernelTracer& tracer, const PixelBlock& p
   return result;
 }
 
-PixelTraversal KernelScene::startTraversal(const PixelBlock& pixels) const {
-  const std::size_t rays = pixels.size();
-  return {pixels, CsgTraversal(csg_, solids_.size(), std::vector<double>(rays, far_)),
-          std::vector<PixelTraversal::Crossings>(solids_.size(),
-                                                 {std::vector<double>(rays), ShapeBlock(rays)})};
+PixelTraversal KernelScene::startTraversal(const KernelTracer& tracer,
+                                           const PixelBlock& pixels) const {
+  const std::size_t count = pixels.size();
+  PixelTraversal walk{pixels, CsgTraversal(csg_, operandCount(), std::vector<double>(count, far_)),
+                      emptyCrossings(count)};
+  if (operands_.empty()) return walk;
+  const CameraRays at(camera_);
+  std::vector<Camera::Ray> rays;
+  for (std::size_t i = 0; i < count; ++i)
+    rays.push_back(at.at(static_cast<double>(pixels.x[i]) + camera_.middleX(),
+                         static_cast<double>(pixels.y[i]) + 0.5 * camera_.height));
+  walk.beziers = crossOperands(tracer, rays);
+  return walk;
+}
+
+std::vector<PixelTraversal::Crossings> KernelScene::emptyCrossings(std::size_t rays) const {
+  std::vector<PixelTraversal::Crossings> next(solids_.size(),
+                                              {std::vector<double>(rays), ShapeBlock(rays)});
+  next.resize(operandCount(), {std::vector<double>(rays), ShapeBlock(0),
+                               std::vector<BezierRoot>(operands_.empty() ? 0 : rays)});
+  return next;
 }
 
 void PixelTraversal::takeMet(const CsgTraversal& walk, const std::vector<Crossings>& next,
@@ -307,12 +342,17 @@ void PixelTraversal::takeMet(const CsgTraversal& walk, const std::vector<Crossin
     hits.solid[i] = met;
     hits.depth[i] = next[s].depth[i];
     hits.flipped[i] = walk.isFlipped(i) ? 1 : 0;
-    hits.shapes.take(i, next[s].shapes, i);
+    if (next[s].roots.empty()) {
+      hits.shapes.take(i, next[s].shapes, i);
+      continue;
+    }
+    hits.roots.resize(hits.solid.size());
+    hits.roots[i] = next[s].roots[i];
   }
 }
 
 PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& traversal) const {
-  auto& [pixels, walk, next] = traversal;
+  auto& [pixels, walk, next, beziers] = traversal;
   PixelHits result(pixels.size());
   do {
     for (std::size_t s = 0; s < solids_.size(); ++s) {
@@ -341,6 +381,9 @@ PixelHits KernelScene::castNext(const KernelTracer& tracer, PixelTraversal& trav
                     hits.found[n] == HitBlock::kEnters);
       }
     }
+    for (std::size_t n = 0; n < operands_.size(); ++n)
+      answerOperand(walk, solids_.size() + n, beziers.roots[n], &next[solids_.size() + n],
+                    [](const BezierRoot& root) { return root.depth; });
   } while (walk.advance());
   PixelTraversal::takeMet(walk, next, result);
   return result;

@@ -3,6 +3,7 @@
 #include <Imath/ImathBox.h>
 #include <Imath/ImathMatrix.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "levelset/memory/memory_limit.h"
+#include "render/bezier/solid_crossings.h"
 #include "render/bricks/brick_pool.h"
 #include "render/direct/direct_volume.h"
 #include "render/kernel/csg_traversal.h"
@@ -78,14 +80,25 @@ class KernelTracer : public FieldTracer {
 
 /// Hits of the rays through a block of pixels with solids, at most one for each ray.
 struct PixelHits {
-  std::vector<double> depth;        ///< along the view axis, world units
-  std::vector<std::int32_t> solid;  ///< index in KernelScene::solids(); −1: no hit
+  std::vector<double> depth;  ///< along the view axis, world units
+  /// Index in KernelScene::solids(), or their number plus that of a Bézier operand; −1: no hit.
+  std::vector<std::int32_t> solid;
   /// 1: the drawn shape is on the outside of the hit solid, as for a subtracted solid.
   std::vector<char> flipped;
   ShapeBlock shapes;
+  /// Roots of the hits with Bézier operands; empty without any.
+  std::vector<BezierRoot> roots = {};
 
   explicit PixelHits(std::size_t size)
       : depth(size), solid(size, -1), flipped(size, 0), shapes(size) {}
+};
+
+/// Crossings of rays with the Bézier volumes that are operands of the expression.
+struct OperandCrossings {
+  /// For each operand and ray, in order of their distance.
+  std::vector<std::vector<std::vector<BezierRoot>>> roots = {};
+  std::size_t open = 0;      ///< number of pairs with SolidCrossings::isOpen
+  std::size_t overruns = 0;  ///< TreeCounts::overruns
 };
 
 /// State of rays through pixels that continue from one surface to the next.
@@ -95,8 +108,10 @@ struct PixelTraversal {
   struct Crossings {  ///< next crossing of each ray with one solid
     std::vector<double> depth;
     ShapeBlock shapes;
+    std::vector<BezierRoot> roots = {};  ///< of a Bézier operand, which has no shapes
   };
   std::vector<Crossings> next;
+  OperandCrossings beziers = {};
 
   /// Hits of rays that have met the drawn shape, from the next crossings of the solids.
   static void takeMet(const CsgTraversal& walk, const std::vector<Crossings>& next,
@@ -148,16 +163,19 @@ class KernelScene {
   }
   /// Surfaces in Bézier volumes.
   [[nodiscard]] const std::vector<BezierPart>& beziers() const { return beziers_; }
-  /// Hits of rays of the camera with the surfaces in Bézier volumes, up to the first opaque one;
-  /// empty without any.
+  /// Hits of rays of the camera with the surfaces in Bézier volumes that are no operands, up to the
+  /// first opaque one; empty without any.
   [[nodiscard]] BezierHits castBeziers(const KernelTracer& tracer,
                                        const std::vector<Camera::Ray>& rays,
                                        TreeCounts* counts = nullptr) const;
   /// Returns true for a hit from castBeziers().
   [[nodiscard]] bool isOnBezier(const Hit& hit) const {
     return !hit.isOnMesh && !hit.isOnGround && hit.solid >= bezierSolid_ &&
-           hit.solid < bezierSolid_ + beziers_.size();
+           hit.solid < bezierSolid_ + beziers_.size() && !isOperand(hit.solid - bezierSolid_);
   }
+  /// Hit of a ray on a Bézier operand. @pre hits.solid[i] is the number of one
+  [[nodiscard]] Hit hitOnOperand(const Camera::Ray& ray, const PixelHits& hits,
+                                 std::size_t i) const;
   /// Quadrics of the scene.
   [[nodiscard]] const std::vector<QuadricPart>& quadrics() const { return quadrics_; }
   /// First hits of rays of the camera with the quadrics; empty without any.
@@ -176,7 +194,9 @@ class KernelScene {
 
   /// First hits of the rays through pixels with the solids. Meshes, mapped textures and segmented
   /// fields are not included: the caller intersects meshes(), mapped() and segmented().
-  [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
+  /// @param operands  receives the counts of the Bézier operands; may be null
+  [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels,
+                                     OperandCrossings* operands = nullptr) const;
   /// First hits of rays of any origin with the solids, between the rays' ends. `depth` of the
   /// result is the distance along the ray. A ray that starts in a solid hits where it leaves the
   /// solid.
@@ -185,7 +205,8 @@ class KernelScene {
   /// First hits of rays of any origin with the surfaces in Bézier volumes, at most one for each
   /// ray; empty without any.
   [[nodiscard]] BezierHits castBeziersOf(const std::vector<Camera::Ray>& rays) const;
-  [[nodiscard]] PixelTraversal startTraversal(const PixelBlock& pixels) const;
+  [[nodiscard]] PixelTraversal startTraversal(const KernelTracer& tracer,
+                                              const PixelBlock& pixels) const;
   /// Next hits of the rays that CsgTraversal::resume() has released, or first hits in the first
   /// call. All other rays keep their present hit.
   [[nodiscard]] PixelHits castNext(const KernelTracer& tracer, PixelTraversal& traversal) const;
@@ -198,6 +219,31 @@ class KernelScene {
                                                    const std::vector<LightRay>& rays) const;
 
  private:
+  /// True for a Bézier volume that the expression names. @param part  index in beziers()
+  [[nodiscard]] bool isOperand(std::size_t part) const {
+    return std::find(operands_.begin(), operands_.end(), part) != operands_.end();
+  }
+  /// Number of operands of csg_: level sets, then Bézier volumes.
+  [[nodiscard]] std::size_t operandCount() const { return solids_.size() + operands_.size(); }
+  [[nodiscard]] double opacityOf(std::size_t operand) const {
+    return operand < solids_.size() ? solids_[operand].opacity
+                                    : beziers_[operands_[operand - solids_.size()]].opacity;
+  }
+  /// Crossings with the Bézier operands of rays of the camera.
+  [[nodiscard]] OperandCrossings crossOperands(const KernelTracer& tracer,
+                                               const std::vector<Camera::Ray>& rays) const;
+  /// Crossings with the Bézier operands of rays of any origin, from their begin to infinity.
+  [[nodiscard]] OperandCrossings crossOperandsOf(const std::vector<LightRay>& rays,
+                                                 std::size_t first, std::size_t last) const;
+  /// Answers the queries about a Bézier operand.
+  /// @param next  receives the crossings; null: they are not needed
+  /// @param placeOf  position of a root along the ray, in the unit of the walk
+  template <typename Place>
+  static void answerOperand(CsgTraversal& walk, std::size_t number,
+                            const std::vector<std::vector<BezierRoot>>& crossings,
+                            PixelTraversal::Crossings* next, const Place& placeOf);
+  /// Crossings of all operands before the first answer.
+  [[nodiscard]] std::vector<PixelTraversal::Crossings> emptyCrossings(std::size_t rays) const;
   [[nodiscard]] PixelHits castFirst(const KernelTracer& tracer, const PixelBlock& pixels) const;
   // Parts of castRays(), without an expression and with one, for rays without `near`.
   void castFirstOf(const KernelTracer& tracer, const std::vector<LightRay>& rays,
@@ -227,17 +273,41 @@ class KernelScene {
   std::vector<Extent> extents_;
   Counts counts_;
   std::vector<KernelSolid> solids_;  // sorted by voxel size and id
-  CsgExpression csg_;                // uses indices of solids_
+  /// Uses indices of solids_, and their number plus indices of operands_.
+  CsgExpression csg_;
   MeshRays meshes_;
   MappedRays mapped_;
   std::optional<SegmentedPart> segmented_;
   std::vector<BezierPart> beziers_;
   std::vector<std::shared_ptr<const SharedTree>> trees_;  // of beziers_, for the camera
   std::size_t bezierSolid_ = 0;                           // Hit::solid of the first of beziers_
+  std::vector<std::size_t> operands_;  // indices in beziers_ of those that the expression names
+  Camera camera_;
   std::vector<QuadricPart> quadrics_;
   std::optional<FieldTraversal> fields_;
   Imath::Box3d bounds_, tableBounds_;
   double near_ = 0, far_ = Camera::kNoDepth;  // visible depth range of the camera, world units
 };
+
+template <typename Place>
+void KernelScene::answerOperand(CsgTraversal& walk, std::size_t number,
+                                const std::vector<std::vector<BezierRoot>>& crossings,
+                                PixelTraversal::Crossings* next, const Place& placeOf) {
+  for (const CsgTraversal::Query& query : walk.queriesFor(number)) {
+    const std::vector<BezierRoot>& roots = crossings[query.ray];
+    const auto passing = static_cast<std::size_t>(query.passing);
+    if (passing >= roots.size()) {
+      walk.answerNone(number, query);
+      continue;
+    }
+    const BezierRoot& root = roots[passing];
+    const double place = placeOf(root);
+    if (next) {
+      next->depth[query.ray] = place;
+      next->roots[query.ray] = root;
+    }
+    walk.answer(number, query, place, root.isEntry);
+  }
+}
 
 }  // namespace render

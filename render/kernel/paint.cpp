@@ -81,7 +81,7 @@ LightLattice KernelPainter::latticeOf(const KernelTracer& tracer, const PixelBox
     at.y[i] = static_cast<float>(points[i].y - 0.5 * camera.height);
     views.push_back(camera_.at(points[i].x, points[i].y));
   }
-  const PixelHits hits = surfaces_.castPixels(tracer, at);
+  const PixelHits hits = castPixels(tracer, at);
   const FirstHits first = firstHits(tracer, views);
   std::vector<LightLattice::Node> nodes(points.size());
   std::vector<LightRay> rays;
@@ -137,6 +137,18 @@ std::vector<KernelPainter::Pixel> KernelPainter::pixelsOf(const PixelBox& box) {
 std::size_t KernelPainter::numberOf(const Pixel& pixel) const {
   return static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(scene_.camera.width) +
          static_cast<std::size_t>(pixel.x);
+}
+
+void KernelPainter::countOperands(const OperandCrossings& operands) const {
+  if (operands.overruns > 0) layers_.overruns += operands.overruns;
+  if (operands.open > 0) layers_.open += operands.open;
+}
+
+PixelHits KernelPainter::castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const {
+  OperandCrossings operands;
+  PixelHits hits = surfaces_.castPixels(tracer, pixels, &operands);
+  countOperands(operands);
+  return hits;
 }
 
 KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
@@ -202,7 +214,9 @@ Hit KernelPainter::nearestOf(const Camera::Ray& ray, double meshNear, const Hit&
 
 Hit KernelPainter::hitOnSolid(const Camera::Ray& ray, double distance, const PixelHits& hits,
                               std::size_t i) const {
-  const KernelSolid& solid = surfaces_.solids()[static_cast<std::size_t>(hits.solid[i])];
+  const auto number = static_cast<std::size_t>(hits.solid[i]);
+  if (number >= surfaces_.solids().size()) return surfaces_.hitOnOperand(ray, hits, i);
+  const KernelSolid& solid = surfaces_.solids()[number];
   Hit hit;
   hit.found = true;
   hit.distance = distance;
@@ -288,7 +302,7 @@ std::vector<char> KernelPainter::paintData(const KernelTracer& tracer,
   };
   std::vector<Probe> probes;
   std::vector<LightRay> shadowRays;
-  const PixelHits hits = surfaces_.castPixels(tracer, at);
+  const PixelHits hits = castPixels(tracer, at);
   const FirstHits first = firstHits(tracer, views);
   std::vector<VolumeSegment> inVolume;  // from the camera to the first surfaces
   std::vector<Hit> seen;                // for the layers of light
@@ -376,11 +390,12 @@ void KernelPainter::paintColours(const KernelTracer& tracer, const std::vector<P
     }
     const FirstHits first = firstHits(tracer, views);
     if (scene_.isOpaque()) {
-      addSeen(tracer, pixels, s, surfaces_.castPixels(tracer, at), first, lattice, contradicts,
-              sampleRays, sums);
+      addSeen(tracer, pixels, s, castPixels(tracer, at), first, lattice, contradicts, sampleRays,
+              sums);
       continue;
     }
-    PixelTraversal walk = surfaces_.startTraversal(at);
+    PixelTraversal walk = surfaces_.startTraversal(tracer, at);
+    countOperands(walk.beziers);
     for (bool seesMore = true; seesMore;) {
       const PixelHits hits = surfaces_.castNext(tracer, walk);
       for (const std::size_t i :

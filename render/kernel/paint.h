@@ -39,6 +39,9 @@ class KernelPainter {
     std::vector<Hit> onFields, onInterfaces, onQuadrics;
     BezierHits onBeziers;
   };
+  /// KernelScene::castPixels(), with the counts of Bézier operands in the layers.
+  [[nodiscard]] PixelHits castPixels(const KernelTracer& tracer, const PixelBlock& pixels) const;
+  void countOperands(const OperandCrossings& operands) const;
   /// @param ofCamera  false: the rays have any origin, and only their first hits are found
   [[nodiscard]] FirstHits firstHits(const KernelTracer& tracer,
                                     const std::vector<Camera::Ray>& rays,

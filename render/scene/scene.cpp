@@ -1,7 +1,11 @@
 #include "render/scene/scene.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <limits>
+
+#include "levelset/error.h"
 
 namespace render {
 namespace {
@@ -43,21 +47,32 @@ Imath::Box3d Scene::volumeBounds() const {
   return all;
 }
 
-Imath::Box3d Scene::bounds() const {
+namespace {
+
+/// Box of the solids and the operands of the expression, world units.
+Imath::Box3d solidBox(const Scene& scene) {
   std::vector<Imath::Box3d> boxes;
   Imath::Box3d all;
-  for (const Solid& solid : solids) {
+  for (const Solid& solid : scene.solids) {
     boxes.push_back(solid.bounds());
     all.extendBy(boxes.back());
   }
+  for (const BezierPart& part : scene.beziers) boxes.push_back(part.caster.bounds());
   // Distance by which a smooth union may extend beyond its operands, as a multiple of the softness
   // K.
   constexpr double kMostGrowth = 0.25;
-  if (!csg.isEmpty()) all = csg.bounds(boxes, kMostGrowth * softness);
+  return scene.csg.isEmpty() ? all : scene.csg.bounds(boxes, kMostGrowth * scene.softness);
+}
+
+}  // namespace
+
+Imath::Box3d Scene::bounds() const {
+  Imath::Box3d all = solidBox(*this);
   for (const MeshPart& part : meshes) all.extendBy(levelset::bounds(*part.mesh));
   forEachNode(mapped, [&](const Imath::V3d& p) { all.extendBy(p); });
   if (segmented) all.extendBy(segmented->caster.bounds());
-  for (const BezierPart& part : beziers) all.extendBy(part.caster.bounds());
+  for (std::size_t n = 0; n < beziers.size(); ++n)
+    if (!isOperand(n)) all.extendBy(beziers[n].caster.bounds());
   for (const QuadricPart& part : quadrics) all.extendBy(part.caster.bounds());
   return all;
 }
@@ -71,15 +86,11 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
     if (csg.isEmpty() || csg.uses(i))
       extend(ofSolids, solids[i].volume ? solids[i].volume->extents(directions)
                                         : solids[i].band.zeroSetExtents(directions));
+  for (std::size_t n = 0; n < beziers.size(); ++n)
+    if (isOperand(n)) extend(ofSolids, beziers[n].caster.extents(directions));
   if (!csg.isEmpty() || isBlended()) {
     // The result may be smaller than its operands, or extend beyond them. Bound it by its box.
-    Scene withoutOthers = *this;
-    withoutOthers.meshes.clear();
-    withoutOthers.mapped.clear();
-    withoutOthers.segmented.reset();
-    withoutOthers.beziers.clear();
-    withoutOthers.quadrics.clear();
-    const Imath::Box3d box = withoutOthers.bounds();
+    const Imath::Box3d box = solidBox(*this);
     for (std::size_t d = 0; d < directions.size(); ++d) {
       const double extent =
           box.isEmpty() ? -std::numeric_limits<double>::infinity() : extentOf(box, directions[d]);
@@ -95,9 +106,27 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
       ofSolids[d] = std::max(ofSolids[d], p.dot(directions[d]));
   });
   if (segmented) extend(ofSolids, segmented->caster.extents(directions));
-  for (const BezierPart& part : beziers) extend(ofSolids, part.caster.extents(directions));
+  for (std::size_t n = 0; n < beziers.size(); ++n)
+    if (!isOperand(n)) extend(ofSolids, beziers[n].caster.extents(directions));
   for (const QuadricPart& part : quadrics) extend(ofSolids, part.caster.extents(directions));
   return ofSolids;
+}
+
+void requireOperands(const Scene& scene) {
+  for (std::size_t n = 0; n < scene.beziers.size(); ++n) {
+    if (!scene.isOperand(n)) continue;
+    const BezierPart& part = scene.beziers[n];
+    if (scene.isBlended())
+      throw levelset::UsageError(fmt::format(
+          "scene: the Bézier volume '{}' cannot be an operand of a soft expression; leave the "
+          "softness out",
+          part.name));
+    if (const std::string& why = part.caster.refusalAsSolid(); !why.empty())
+      throw levelset::InvalidInput(fmt::format(
+          "scene: the Bézier volume '{}' cannot be an operand of the expression: {}, or "
+          "leave its name out",
+          part.name, why));
+  }
 }
 
 Camera framingCamera(const Scene& scene, int width, int height, double verticalFov,

@@ -102,19 +102,27 @@ struct Scene {
   std::optional<SegmentedPart> segmented = {};
   /// Not with a ground, on which the volume would have no shadow.
   std::optional<VolumePart> volumePart = {};
-  CsgExpression csg = {};  ///< expression over the solids; empty: each solid is drawn
+  /// Expression over the solids and the Bézier volumes; empty: each of them is drawn. Bézier
+  /// volumes that it does not name are drawn, too.
+  CsgExpression csg = {};
   /// K of the smooth minimum in the expression, world units (FieldExpression); 0: sharp edges.
   double softness = 0;
   std::optional<double> morph =
       {};  ///< fraction of the morph from the first solid to the second, [0, 1]; unset: no morph
   std::optional<Ground> ground = {};
-  /// Surfaces in Bézier volumes, drawn beside the solids. Not in a blended scene.
+  /// Surfaces in Bézier volumes, drawn beside the solids or operands of the expression. Not in a
+  /// blended scene.
   std::vector<BezierPart> beziers = {};
   /// Drawn beside the solids. Not in a blended scene.
   std::vector<QuadricPart> quadrics = {};
   /// True when the scene is drawn as the zero set of one function of all solids' fields: a soft
   /// expression or a morph (render/scene/field_expression.h).
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }
+  /// True for a Bézier volume that the expression names. In the expression, its number is that of
+  /// the solids plus its index. @param bezier  index in `beziers`
+  [[nodiscard]] bool isOperand(std::size_t bezier) const {
+    return !csg.isEmpty() && csg.uses(solids.size() + bezier);
+  }
   /// True when no surface is transparent.
   [[nodiscard]] bool isOpaque() const;
   /// True when a volume is among the solids.
@@ -130,6 +138,11 @@ struct Scene {
   /// has no surface.
   [[nodiscard]] std::vector<double> extents(const std::vector<Imath::V3d>& directions) const;
 };
+
+/// Checks the Bézier volumes that the expression names.
+/// @throws levelset::UsageError for a smooth expression
+/// @throws levelset::InvalidInput for a volume that is no solid: BezierCaster::refusalAsSolid()
+void requireOperands(const Scene& scene);
 
 /// Default camera of a scene: frames its surfaces in a three-quarter view, and the grid of a volume
 /// of which it draws no isosurface.

@@ -92,6 +92,13 @@ void PictureLayers::addWarnings(Image& image, const Scene& scene) const {
         "its surface; move the camera so that no ray lies in the surface",
         count, count == 1 ? "" : "s", kMostVisits));
   }
+  if (const std::size_t count = open; count > 0) {
+    image.attributes["ls:bezierOpen"] = fmt::format("{}", count);
+    warn(fmt::format(
+        "{} ray{} enter{} a Bézier volume of the expression and do{} not leave it, or the reverse; "
+        "their crossings there are left out, so the expression may be wrong at their pixels",
+        count, count == 1 ? "" : "s", count == 1 ? "s" : "", count == 1 ? "es" : ""));
+  }
   const std::size_t count = beyondBand;
   if (count == 0) return;
   warn(fmt::format(
@@ -198,6 +205,7 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
     throw levelset::UsageError(
         "a volume with a transfer function has no shadow; leave --ground out, or draw the scene "
         "without the volume");
+  requireOperands(scene);
   requireFields(scene);
   if (scene.isBlended() && options.filter != Filter::Trilinear)
     throw levelset::UsageError(

@@ -49,6 +49,8 @@ struct PictureLayers {
       0;  ///< number of pixels whose hit has Hit::isSingular
   /// TreeCounts::overruns of all rays of the camera in Bézier volumes.
   mutable std::atomic<std::size_t> overruns = 0;
+  /// Number of rays that show that a Bézier operand is open (SolidCrossings).
+  mutable std::atomic<std::size_t> open = 0;
 
   PictureLayers(Image& image, const Scene& scene, const RenderOptions& options);
   /// Writes depth, normal, position and id of pixel `i`. @pre the normals of the hit are set

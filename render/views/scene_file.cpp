@@ -421,10 +421,13 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
       !std::all_of(scene.quadrics.begin(), scene.quadrics.end(), isNew))
     reader.refuse(whole, "gives the same \"id\" to two parts; give each part its own");
   if (json.contains("csg"))
-    scene.csg = CsgExpression(reader.text(json, "csg", whole), scene_file::solidNames(scene));
+    scene.csg = CsgExpression(reader.text(json, "csg", whole), scene_file::operandNames(scene));
   if (json.contains("soft")) scene.softness = reader.number(json, "soft", whole);
   if (json.contains("morph")) scene.morph = reader.number(json, "morph", whole);
-  reader.withContext(whole, [&] { requireFields(scene); });
+  reader.withContext(whole, [&] {
+    requireOperands(scene);
+    requireFields(scene);
+  });
   return viewed;
 }
 

@@ -17,6 +17,8 @@ inline constexpr int kVersion = 1;
 inline constexpr double kDegree = std::numbers::pi / 180;
 
 [[nodiscard]] std::vector<std::string> solidNames(const Scene& scene);
+/// Names of the operands of an expression, by their numbers: solids, then Bézier volumes.
+[[nodiscard]] std::vector<std::string> operandNames(const Scene& scene);
 
 /// @throws levelset::UsageError for names of parts that requireSceneNames() refuses
 void requireNames(const Scene& scene);

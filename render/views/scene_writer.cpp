@@ -85,6 +85,12 @@ std::vector<std::string> solidNames(const Scene& scene) {
   return names;
 }
 
+std::vector<std::string> operandNames(const Scene& scene) {
+  std::vector<std::string> names = solidNames(scene);
+  for (const BezierPart& part : scene.beziers) names.push_back(part.name);
+  return names;
+}
+
 void requireNames(const Scene& scene) {
   std::vector<std::string> names = solidNames(scene);
   for (const MeshPart& part : scene.meshes) names.push_back(part.name);

@@ -49,8 +49,10 @@ void frameWith(const V3d& n, V3d& s, V3d& t) {
 }
 
 std::string unusedName(const render::Scene& scene, std::string name) {
-  const auto isTaken = [&](const render::Solid& solid) { return solid.name == name; };
-  while (std::any_of(scene.solids.begin(), scene.solids.end(), isTaken)) name += "_";
+  const auto isTaken = [&](const auto& part) { return part.name == name; };
+  while (std::any_of(scene.solids.begin(), scene.solids.end(), isTaken) ||
+         std::any_of(scene.beziers.begin(), scene.beziers.end(), isTaken))
+    name += "_";
   return name;
 }
 
@@ -202,9 +204,14 @@ ClippedScene::ClippedScene(const render::Scene& scene, const Imath::Box3d& bound
   }
   const std::string cut = unusedName(scene_, kCutName);
   names.push_back(cut);
+  for (render::BezierPart& part : scene_.beziers) {
+    if (part.name.empty()) part.name = unusedName(scene_, "volume");
+    names.push_back(part.name);
+  }
   std::uint32_t id = 1;
   for (const render::Solid& solid : scene_.solids) id = std::max(id, solid.id + 1);
   for (const render::MeshPart& part : scene_.meshes) id = std::max(id, part.id + 1);
+  for (const render::BezierPart& part : scene_.beziers) id = std::max(id, part.id + 1);
   scene_.solids.push_back({.band = box_, .colour = {0.75f, 0.75f, 0.75f}, .id = id, .name = cut});
   scene_.csg = render::CsgExpression(
       fmt::format("({}) - {}", scene.csg.isEmpty() ? all : scene.csg.text(), cut), names);
@@ -221,7 +228,11 @@ const render::Scene& ClippedScene::at(const PlacedPlane& plane) {
 
 double scenePhi(const render::Scene& scene, const std::vector<double>& values) {
   if (values.empty()) return std::numeric_limits<double>::infinity();
-  if (!scene.csg.isEmpty()) return scene.csg.phi(values.data());
+  if (!scene.csg.isEmpty()) {
+    std::vector<double> all = values;
+    all.resize(scene.solids.size() + scene.beziers.size(), std::numeric_limits<double>::infinity());
+    return scene.csg.phi(all.data());
+  }
   return *std::min_element(values.begin(), values.end());
 }
 

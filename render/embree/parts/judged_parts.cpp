@@ -21,6 +21,8 @@ JudgedParts::JudgedParts(const Scene& scene)
   }
   firstBezier_ = firstSolid_ + (segmented_ ? 1 : 0);
   firstQuadric_ = firstBezier_ + beziers_.size();
+  for (std::size_t n = 0; n < beziers_.size(); ++n)
+    if (scene.isOperand(n)) operands_.push_back(n);
   for (const BezierPart& part : beziers_) bounds_.extendBy(part.caster.bounds());
   for (const QuadricPart& part : quadrics_) {
     quadricJudges_.emplace_back(part.caster.model());
@@ -41,9 +43,11 @@ Hit JudgedParts::firstHit(const Camera::Ray& ray, bool onlyOpaque) const {
     if (hit.found) take(hit);
   }
   for (std::size_t n = 0; n < beziers_.size(); ++n) {
-    if (onlyOpaque && beziers_[n].opacity < 1) continue;
-    const std::vector<Hit> hits = bezierHits(n, rest);
-    if (!hits.empty()) take(hits[0]);
+    if (isOperand(n) || (onlyOpaque && beziers_[n].opacity < 1)) continue;
+    std::vector<Hit> hits = bezierHits(n, rest);
+    if (hits.empty()) continue;
+    hits[0].isSingular = false;
+    take(hits[0]);
   }
   for (std::size_t n = 0; n < quadrics_.size(); ++n) {
     const JudgedQuadric found = quadricJudges_[n].firstHit(rest);
@@ -69,19 +73,46 @@ std::vector<Hit> JudgedParts::bezierHits(std::size_t n, const Camera::Ray& ray) 
     const bool isKnown = last && last->patch != root.patch && last->attribute == root.attribute &&
                          root.distance - last->distance < same;
     last = &root;
-    if (!isKnown)
-      hits.push_back(beziers_[n].hitOf(ray, root.distance, root.normal, firstBezier_ + n));
+    if (isKnown) continue;
+    hits.push_back(beziers_[n].hitOf(ray, root.distance, root.normal, firstBezier_ + n));
+    hits.back().isSingular = root.isUndecided;
   }
   return hits;
+}
+
+std::vector<JudgedParts::Crossing> JudgedParts::operandCrossings(std::size_t number,
+                                                                 const Camera::Ray& ray) const {
+  const std::vector<Hit> hits =
+      bezierHits(operands_[number], {ray.origin, ray.direction, ray.near});
+  const auto isEntry = [&](const Hit& hit) { return hit.normal.dot(ray.direction) < 0; };
+  // Layers of the solid at the begin of the ray: the least number with which none is left twice.
+  // Undecided hits count only if the others leave the ray inside.
+  int layers = 0, least = 0, left = 0;
+  for (const Hit& hit : hits) {
+    if (hit.isSingular) continue;
+    left += isEntry(hit) ? 1 : -1;
+    least = std::min(least, left);
+  }
+  layers = -least;
+  const bool needsUndecided = left + layers != 0;
+  std::vector<Crossing> crossings;
+  for (const Hit& hit : hits) {
+    if (hit.isSingular && !needsUndecided) continue;
+    const bool was = layers > 0;
+    layers += isEntry(hit) ? 1 : -1;
+    if (was != (layers > 0)) crossings.push_back({hit, layers > 0});
+  }
+  return crossings;
 }
 
 std::vector<Hit> JudgedParts::transparentHits(const Camera::Ray& ray) const {
   std::vector<Hit> all;
   for (std::size_t n = 0; n < beziers_.size(); ++n) {
-    if (beziers_[n].opacity == 1) continue;
+    if (isOperand(n) || beziers_[n].opacity == 1) continue;
     const std::vector<Hit> hits = bezierHits(n, ray);
     all.insert(all.end(), hits.begin(), hits.end());
   }
+  for (Hit& hit : all) hit.isSingular = false;
   std::stable_sort(all.begin(), all.end(),
                    [](const Hit& a, const Hit& b) { return a.distance < b.distance; });
   return all;

@@ -6,6 +6,7 @@
 #include <Imath/ImathVec.h>
 #include <tbb/enumerable_thread_specific.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -29,6 +30,20 @@ class JudgedParts {
   }
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }  ///< world space
 
+  /// Number of Bézier volumes that are operands of the expression of the scene. They are no parts
+  /// of the hits below.
+  [[nodiscard]] std::size_t operandCount() const { return operands_.size(); }
+  /// Index of an operand in Scene::beziers.
+  [[nodiscard]] std::size_t operand(std::size_t number) const { return operands_[number]; }
+  /// A point where a ray enters or leaves an operand.
+  struct Crossing {
+    Hit hit;
+    bool enters;
+  };
+  /// Crossings of a ray with an operand, from `ray.near` to infinity, in order of their distance.
+  [[nodiscard]] std::vector<Crossing> operandCrossings(std::size_t number,
+                                                       const Camera::Ray& ray) const;
+
   /// First hit of a ray with any part.
   /// @param onlyOpaque  true: without transparent Bézier volumes
   /// @pre the direction is finite and not zero
@@ -39,11 +54,15 @@ class JudgedParts {
  private:
   /// Hits of a ray with a Bézier volume, in order of their distance. @param n  its index
   [[nodiscard]] std::vector<Hit> bezierHits(std::size_t n, const Camera::Ray& ray) const;
+  [[nodiscard]] bool isOperand(std::size_t n) const {
+    return std::find(operands_.begin(), operands_.end(), n) != operands_.end();
+  }
 
   Imath::Box3d bounds_;
   std::optional<SegmentedPart> segmented_;
   std::optional<InterfaceJudge> interfaces_;  // set for a scene with a segmented field
   std::vector<BezierPart> beziers_;
+  std::vector<std::size_t> operands_;  // indices in beziers_ of those that the expression names
   std::vector<QuadricPart> quadrics_;
   std::vector<QuadricJudge> quadricJudges_;
   mutable tbb::enumerable_thread_specific<std::vector<BezierJudge>> bezierJudges_;

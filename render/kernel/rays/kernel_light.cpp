@@ -86,7 +86,9 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
     for (std::size_t n = 0; n < numbers.size(); ++n)
       if (hits[n].found) light[numbers[n]] = 0;
   }
-  for (const BezierPart& part : beziers_)
+  for (std::size_t n = 0; n < beziers_.size(); ++n) {
+    if (isOperand(n)) continue;
+    const BezierPart& part = beziers_[n];
     for (std::size_t i = 0; i < rays.size(); ++i) {
       if (light[i] < kLeastTransmittance) continue;
       const Camera::Ray ray{rays[i].origin, rays[i].direction, 0, rays[i].maxDistance};
@@ -95,6 +97,7 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
       else if (part.caster.isOccluded(ray))
         light[i] = 0;
     }
+  }
   for (const QuadricPart& part : quadrics_)
     for (std::size_t i = 0; i < rays.size(); ++i)
       if (light[i] >= kLeastTransmittance &&
@@ -131,7 +134,8 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
                            std::size_t first, std::size_t last, std::vector<double>& light) const {
   std::vector<double> maxDistance;
   for (std::size_t i = first; i < last; ++i) maxDistance.push_back(rays[i].maxDistance);
-  CsgTraversal walk(csg_, solids_.size(), std::move(maxDistance));
+  CsgTraversal walk(csg_, operandCount(), std::move(maxDistance));
+  const OperandCrossings beziers = crossOperandsOf(rays, first, last);
   bool asks;
   do {
     for (std::size_t s = 0; s < solids_.size(); ++s) {
@@ -161,6 +165,9 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
         if (isNear) ++n;
       }
     }
+    for (std::size_t n = 0; n < operands_.size(); ++n)
+      answerOperand(walk, solids_.size() + n, beziers.roots[n], nullptr,
+                    [](const BezierRoot& root) { return root.distance; });
     asks = walk.advance();
     // Rays with a hit continue only when no ray has open queries, so that all rays continue in one
     // batch.
@@ -168,7 +175,7 @@ void KernelScene::dimByCsg(const KernelTracer& tracer, const std::vector<LightRa
     for (std::size_t i = first; i < last; ++i) {
       const std::int32_t met = walk.solidMet(i - first);
       if (met < 0 || light[i] < kLeastTransmittance) continue;
-      light[i] *= 1 - solids_[static_cast<std::size_t>(met)].opacity;
+      light[i] *= 1 - opacityOf(static_cast<std::size_t>(met));
       if (light[i] < kLeastTransmittance) continue;
       walk.resume(i - first);
       asks = true;

@@ -40,6 +40,7 @@ PixelHits KernelScene::castRays(const KernelTracer& tracer,
     castCsgOf(tracer, started, result);
   for (std::size_t i = 0; i < rays.size(); ++i)
     if (result.solid[i] >= 0) result.depth[i] += rays[i].near;
+  for (std::size_t i = 0; i < result.roots.size(); ++i) result.roots[i].distance += rays[i].near;
   return result;
 }
 
@@ -69,9 +70,9 @@ void KernelScene::castCsgOf(const KernelTracer& tracer, const std::vector<LightR
                             PixelHits& result) const {
   std::vector<double> maxDistances;
   for (const LightRay& ray : rays) maxDistances.push_back(ray.maxDistance);
-  CsgTraversal walk(csg_, solids_.size(), std::move(maxDistances));
-  std::vector<PixelTraversal::Crossings> next(
-      solids_.size(), {std::vector<double>(rays.size()), ShapeBlock(rays.size())});
+  CsgTraversal walk(csg_, operandCount(), std::move(maxDistances));
+  std::vector<PixelTraversal::Crossings> next = emptyCrossings(rays.size());
+  const OperandCrossings beziers = crossOperandsOf(rays, 0, rays.size());
   do {
     for (std::size_t s = 0; s < solids_.size(); ++s) {
       const KernelSolid& solid = solids_[s];
@@ -103,17 +104,21 @@ void KernelScene::castCsgOf(const KernelTracer& tracer, const std::vector<LightR
         walk.answer(s, queries[q], place, hits.found[n] == HitBlock::kEnters);
       }
     }
+    for (std::size_t n = 0; n < operands_.size(); ++n)
+      answerOperand(walk, solids_.size() + n, beziers.roots[n], &next[solids_.size() + n],
+                    [](const BezierRoot& root) { return root.distance; });
   } while (walk.advance());
   PixelTraversal::takeMet(walk, next, result);
 }
 
 BezierHits KernelScene::castBeziersOf(const std::vector<Camera::Ray>& rays) const {
   BezierHits result;
-  if (beziers_.empty()) return result;
+  if (operands_.size() == beziers_.size()) return result;
   result.first.push_back(0);
   for (const Camera::Ray& ray : rays) {
     Hit nearest;
     for (std::size_t part = 0; part < beziers_.size(); ++part) {
+      if (isOperand(part)) continue;
       const std::optional<BezierRoot> root = beziers_[part].caster.firstHit(ray);
       if (!root || (nearest.found && nearest.distance <= root->distance)) continue;
       nearest = beziers_[part].hitOf(ray, root->distance, root->normal, bezierSolid_ + part);

@@ -122,6 +122,19 @@ Plan planScene(Invocation& in) {
   return plan;
 }
 
+/// Takes the only part of a scene that `read` made of the file of a Bézier volume.
+render::BezierPart bezierPart(const Value& operand, const std::string& name) {
+  const render::Scene& scene = operand.scene().scene;
+  const std::size_t others = scene.solids.size() + scene.meshes.size() + scene.quadrics.size() +
+                             (scene.volumePart ? 1 : 0);
+  if (scene.beziers.size() != 1 || others > 0)
+    throw UsageError(
+        fmt::format("scene: '{}' is a scene with other parts than one Bézier volume; list its "
+                    "parts in the new scene, or edit its file",
+                    name));
+  return scene.beziers.front();
+}
+
 Value makeScene(Invocation& in) {
   (void)planScene(in);
   const std::vector<std::string> names = partNames(in);
@@ -133,7 +146,7 @@ Value makeScene(Invocation& in) {
                     colours.size(), in.operands.size()));
   render::ViewedScene viewed;
   render::Scene& scene = viewed.scene;
-  std::vector<std::string> solids;
+  std::vector<std::string> solids, beziers;
   for (std::size_t i = 0; i < in.operands.size(); ++i) {
     const Imath::C3f& colour = colours[i % colours.size()];
     const auto id = static_cast<std::uint32_t>(i + 1);
@@ -149,6 +162,12 @@ Value makeScene(Invocation& in) {
                               names[i], opacities[i]});
       continue;
     }
+    if (in.operands[i].kind() == Kind::Scene) {
+      scene.beziers.push_back(
+          {bezierPart(in.operands[i], names[i]).caster, colour, id, names[i], opacities[i]});
+      beziers.push_back(names[i]);
+      continue;
+    }
     scene.solids.push_back({.band = in.band(i),
                             .colour = colour,
                             .id = id,
@@ -156,13 +175,18 @@ Value makeScene(Invocation& in) {
                             .opacity = opacities[i]});
     solids.push_back(names[i]);
   }
-  if (in.given("csg")) scene.csg = render::CsgExpression(in.text("csg"), solids);
+  if (in.given("csg")) {
+    std::vector<std::string> operands = solids;
+    operands.insert(operands.end(), beziers.begin(), beziers.end());
+    scene.csg = render::CsgExpression(in.text("csg"), operands);
+  }
   for (std::size_t i = 0; i < solids.size() && in.given("csg"); ++i)
     if (!scene.csg.uses(i))
       in.notes.warnings.push_back(
           fmt::format("scene: --csg does not name '{}', which is not drawn", solids[i]));
   if (in.given("soft")) scene.softness = in.length("soft");
   if (in.given("morph")) scene.morph = in.number("morph");
+  render::requireOperands(scene);
   render::requireFields(scene);
   viewed.hasCamera = givesCamera(in);
   Imath::Box3d bounds = scene.bounds();
@@ -194,7 +218,8 @@ Operator sceneOperator() {
       .name = "scene",
       .group = "Pictures",
       .summary =
-          "combine level sets, meshes and a volume in one picture, or solids by a CSG expression",
+          "combine level sets, meshes, Bézier volumes and a volume in one picture, or solids by a "
+          "CSG expression",
       .details =
           "With --csg the rays of 'render' combine the solids: a | b is the union, a & b the "
           "intersection, a - b the difference. Solids are not resampled; each keeps its voxels. "
@@ -204,7 +229,9 @@ Operator sceneOperator() {
           "protrude. --soft blends the distances to the solids: surfaces closer than this length "
           "merge. --morph interpolates between the distances of two solids. One part may be a "
           "volume, "
-          "drawn by --transfer in front of, around and behind the surfaces. 'write scene.json' "
+          "drawn by --transfer in front of, around and behind the surfaces. A Bézier volume that "
+          "'read' has read may be a part, and an operand of --csg if its surface is closed. 'write "
+          "scene.json' "
           "saves a scene without a volume, with the parts in files beside it.",
       .example =
           "levelsmith box --size 2,2,2 --voxel 0.05 --as b ! sphere --radius 1.3 --voxel "
@@ -212,7 +239,8 @@ Operator sceneOperator() {
       .params =
           {{.name = "csg",
             .type = ParamType::Text,
-            .doc = "CSG expression of the solids to draw, as '(a | b) - c'; default: all parts"},
+            .doc = "CSG expression of the solids and Bézier volumes to draw, as '(a | b) - c'; "
+                   "default: all parts"},
            {.name = "soft",
             .type = ParamType::Length,
             .doc = "with --csg: solids blend where their distances differ by less than this; at "
@@ -234,7 +262,7 @@ Operator sceneOperator() {
             .doc = "opacities of the parts, above 0 and up to 1, separated by blanks; below 1 a "
                    "surface is transparent in the layers R G B A and casts a weaker shadow; a "
                    "volume has the opacities of --transfer instead"}},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Volume, Kind::Field}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Volume, Kind::Field, Kind::Scene}},
       .takesMore = true,
       .readsNames = true,
       .resultKind = [](const Invocation&) { return Kind::Scene; },

@@ -231,6 +231,31 @@ TEST(GpuBeziers, DrawTransparentAndTrimmedPartsWithTheBitsOfTheProcessor) {
   EXPECT_EQ(gpu.ids, cpu.ids);
 }
 
+/// Bézier volumes and a level set in one expression, with transparent operands and shadows.
+TEST(GpuBeziers, DrawExpressionsWithTheBitsOfTheProcessor) {
+  for (const double opacity : {1.0, 0.4}) {
+    Scene scene;
+    scene.solids.push_back(
+        {.band = levelset::makeSphere(0.9, V3d(0.7, 0.3, 0.9), 0.1), .id = 8, .name = "ball"});
+    scene.beziers.push_back({.caster = BezierCaster(bezier_scenes::dice()),
+                             .id = 5,
+                             .name = "die",
+                             .opacity = opacity});
+    BezierVolume small = bezier_scenes::sphere(3);
+    for (V3d& point : small.patches[0].points) point = point * 0.4 + V3d(-1.2, 0.3, 0.5);
+    scene.beziers.push_back({.caster = BezierCaster(small), .id = 6, .name = "small"});
+    scene.csg = CsgExpression("(die - ball) | small", {"ball", "die", "small"});
+    scene.camera = {.from = {0.4, 1.5, 6}, .to = {0.2, 0, 0}, .width = 24, .height = 18};
+    const RenderOptions options{.samples = 1, .ambientSamples = 1, .shadowSamples = 1};
+    const Image cpu = renderCpu(scene, options), gpu = renderGpu(scene, options);
+    EXPECT_EQ(gpu.channels, cpu.channels);
+    EXPECT_EQ(gpu.ids, cpu.ids);
+    const std::vector<std::uint32_t>& ids = gpu.ids.at("id");
+    for (const std::uint32_t id : {5u, 6u, 8u})
+      EXPECT_GT(std::count(ids.begin(), ids.end(), id), 5) << id;
+  }
+}
+
 TEST(GpuBeziers, PicturesTellOfRaysOnTheProcessor) {
   BezierVolume ball = bezier_scenes::sphere(2);
   for (double& value : ball.patches[0].attributes[0]) value *= 1e-40;

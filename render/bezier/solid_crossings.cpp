@@ -1,0 +1,218 @@
+#include "render/bezier/solid_crossings.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace render {
+namespace {
+
+using Imath::V3d;
+
+/// Faces closer than this are one, and faces of less area are collapsed; shares of the diagonal of
+/// the volume and of its square.
+constexpr double kSameFace = 1e-8, kLeastArea = 1e-10;
+/// Samples of a face along each parameter.
+constexpr int kFaceSamples = 17;
+/// Samples of a patch along each parameter, and of all patches together.
+constexpr double kMostPatchSamples = 9, kFewestPatchSamples = 2, kMostSamples = 1e6;
+/// Step of differences, and the least Jacobian that has a sign over the cube of the diagonal.
+constexpr double kFoldStep = 1e-4, kLeastJacobian = 1e-7;
+
+struct PatchFace {
+  std::size_t patch;
+  int axis;
+  double end;  ///< value of the parameter of the axis, 0 or 1
+  V3d centre{0};
+  double moment = 0;  ///< root mean square distance of the control points from the centre
+  bool isShared = false;
+};
+
+/// Control points of a face, row by row.
+std::vector<std::vector<V3d>> netOf(const BezierPatch& patch, const PatchFace& face) {
+  const int across = (face.axis + 1) % 3, down = (face.axis + 2) % 3;
+  std::vector<std::vector<V3d>> net;
+  std::array<int, 3> at{};
+  at[static_cast<std::size_t>(face.axis)] =
+      face.end == 0 ? 0 : patch.degree[static_cast<std::size_t>(face.axis)];
+  for (int i = 0; i <= patch.degree[static_cast<std::size_t>(across)]; ++i) {
+    net.emplace_back();
+    for (int j = 0; j <= patch.degree[static_cast<std::size_t>(down)]; ++j) {
+      at[static_cast<std::size_t>(across)] = i;
+      at[static_cast<std::size_t>(down)] = j;
+      net.back().push_back(patch.points[patch.index(at[0], at[1], at[2])]);
+    }
+  }
+  return net;
+}
+
+/// Returns the face, or one that counts as shared if it is collapsed.
+PatchFace patchFace(const BezierVolume& volume, std::size_t patch, int axis, double end,
+                    double diagonal) {
+  PatchFace face{patch, axis, end};
+  const std::vector<std::vector<V3d>> net = netOf(volume.patches[patch], face);
+  double count = 0, squares = 0, area = 0;
+  for (const std::vector<V3d>& row : net)
+    for (const V3d& p : row) {
+      face.centre += p;
+      ++count;
+    }
+  face.centre /= count;
+  for (const std::vector<V3d>& row : net)
+    for (const V3d& p : row) squares += (p - face.centre).length2();
+  face.moment = std::sqrt(squares / count);
+  for (std::size_t i = 0; i + 1 < net.size(); ++i)
+    for (std::size_t j = 0; j + 1 < net[i].size(); ++j)
+      area += (net[i + 1][j + 1] - net[i][j]).cross(net[i + 1][j] - net[i][j + 1]).length();
+  face.isShared = area <= kLeastArea * diagonal * diagonal;
+  return face;
+}
+
+/// Marks faces that belong to two patches, or to two ends of one.
+void joinFaces(std::vector<PatchFace>& faces, double tolerance) {
+  std::sort(faces.begin(), faces.end(),
+            [](const PatchFace& a, const PatchFace& b) { return a.centre.x < b.centre.x; });
+  for (std::size_t a = 0; a < faces.size(); ++a)
+    for (std::size_t b = a + 1;
+         b < faces.size() && faces[b].centre.x - faces[a].centre.x <= tolerance; ++b)
+      if ((faces[b].centre - faces[a].centre).length() <= tolerance &&
+          std::abs(faces[b].moment - faces[a].moment) <= tolerance)
+        faces[a].isShared = faces[b].isShared = true;
+}
+
+/// Returns true if the object contains a point. @param inside  as of insideAt()
+bool isInObject(const std::vector<int>& expression, const std::vector<char>& inside) {
+  if (expression.empty()) return inside.front() != 0;
+  std::vector<char> stack;
+  for (const int step : expression) {
+    if (step >= 0) {
+      stack.push_back(inside[static_cast<std::size_t>(step)]);
+      continue;
+    }
+    const bool b = stack.back() != 0;
+    stack.pop_back();
+    const bool a = stack.back() != 0;
+    stack.back() = (step == -1 ? a || b : step == -2 ? a && b : a && !b) ? 1 : 0;
+  }
+  return stack.back() != 0;
+}
+
+/// Samples a face for points inside the object.
+bool reachesFace(const BezierVolume& volume, const PatchFace& face) {
+  for (int i = 0; i < kFaceSamples; ++i)
+    for (int j = 0; j < kFaceSamples; ++j) {
+      V3d parameter;
+      parameter[face.axis] = face.end;
+      parameter[(face.axis + 1) % 3] = static_cast<double>(i) / (kFaceSamples - 1);
+      parameter[(face.axis + 2) % 3] = static_cast<double>(j) / (kFaceSamples - 1);
+      if (isInObject(volume.expression,
+                     insideAt(volume.patches[face.patch], volume.isovalue, parameter)))
+        return true;
+    }
+  return false;
+}
+
+double jacobianAt(const BezierPatch& patch, const V3d& parameter) {
+  V3d slopes[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    V3d step(0);
+    step[axis] = kFoldStep;
+    slopes[axis] = (positionAt(patch, parameter + step) - positionAt(patch, parameter - step)) /
+                   (2 * kFoldStep);
+  }
+  return slopes[0].dot(slopes[1].cross(slopes[2]));
+}
+
+/// Returns true for a patch of a parametric surface: both layers along w are the same.
+bool isSurfacePatch(const BezierPatch& patch) {
+  if (patch.trim) return true;
+  if (patch.degree[2] != 1) return false;
+  for (std::size_t n = 0; n + 1 < patch.points.size(); n += 2)
+    if (patch.points[n] != patch.points[n + 1]) return false;
+  return true;
+}
+
+}  // namespace
+
+SolidCrossings solidCrossings(std::span<const BezierRoot> roots, bool startsOutside) {
+  SolidCrossings result;
+  std::size_t layers = 0;  // of the solid in front of the roots so far, from the end of the ray
+  const BezierRoot* pending = nullptr;  // singular root behind the next one
+  const auto add = [&](const BezierRoot& root, bool isEntry) {
+    result.roots.push_back(root);
+    result.roots.back().isEntry = isEntry;
+  };
+  const auto leave = [&](const BezierRoot& root) {
+    if (layers++ == 0) add(root, false);
+  };
+  const auto enter = [&](const BezierRoot& root) {
+    if (--layers == 0) add(root, true);
+  };
+  for (std::size_t n = roots.size(); n-- > 0;) {
+    const BezierRoot& root = roots[n];
+    if (root.isSingular) {
+      pending = &root;
+      continue;
+    }
+    if (root.isEntry) {
+      if (layers == 0 && pending) leave(*pending);
+      if (layers > 0)
+        enter(root);
+      else
+        result.isOpen = true;
+    } else {
+      if (layers > 0 && pending) enter(*pending);
+      leave(root);
+    }
+    pending = nullptr;
+  }
+  if (startsOutside && layers > 0) {
+    if (pending && layers == 1)
+      enter(*pending);
+    else
+      result.isOpen = true;
+  }
+  std::reverse(result.roots.begin(), result.roots.end());
+  return result;
+}
+
+std::size_t findOpenPatch(const BezierVolume& volume) {
+  const double diagonal = volume.bounds().size().length();
+  std::vector<PatchFace> faces;
+  for (std::size_t p = 0; p < volume.patches.size(); ++p) {
+    if (isSurfacePatch(volume.patches[p])) return p;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double end : {0.0, 1.0})
+        if (PatchFace face = patchFace(volume, p, axis, end, diagonal); !face.isShared)
+          faces.push_back(face);
+  }
+  joinFaces(faces, kSameFace * diagonal);
+  std::size_t open = volume.patches.size();
+  for (const PatchFace& face : faces)
+    if (!face.isShared && face.patch < open && reachesFace(volume, face)) open = face.patch;
+  return open;
+}
+
+std::size_t findFoldedPatch(const BezierVolume& volume) {
+  const double diagonal = volume.bounds().size().length();
+  const double least = kLeastJacobian * diagonal * diagonal * diagonal;
+  const auto patches = static_cast<double>(volume.patches.size());
+  const int samples = static_cast<int>(
+      std::clamp(std::cbrt(kMostSamples / patches), kFewestPatchSamples, kMostPatchSamples));
+  for (std::size_t p = 0; p < volume.patches.size(); ++p) {
+    const BezierPatch& patch = volume.patches[p];
+    bool isPositive = false, isNegative = false;
+    for (int n = 0; n < samples * samples * samples; ++n) {
+      const V3d parameter =
+          (V3d(n % samples, n / samples % samples, n / (samples * samples)) + V3d(0.5)) / samples;
+      if (!isInObject(volume.expression, insideAt(patch, volume.isovalue, parameter))) continue;
+      const double jacobian = jacobianAt(patch, parameter);
+      isPositive = isPositive || jacobian > least;
+      isNegative = isNegative || jacobian < -least;
+    }
+    if (isPositive && isNegative) return p;
+  }
+  return volume.patches.size();
+}
+
+}  // namespace render
