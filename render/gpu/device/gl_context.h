@@ -19,42 +19,67 @@
 
 namespace render {
 
-#define LEVELSMITH_GL_FUNCTIONS(X)                           \
-  X(PFNGLATTACHSHADERPROC, AttachShader)                     \
-  X(PFNGLBINDBUFFERBASEPROC, BindBufferBase)                 \
-  X(PFNGLBINDTEXTUREUNITPROC, BindTextureUnit)               \
-  X(PFNGLCOMPILESHADERPROC, CompileShader)                   \
-  X(PFNGLCOPYNAMEDBUFFERSUBDATAPROC, CopyNamedBufferSubData) \
-  X(PFNGLCREATEBUFFERSPROC, CreateBuffers)                   \
-  X(PFNGLCREATEPROGRAMPROC, CreateProgram)                   \
-  X(PFNGLCREATESHADERPROC, CreateShader)                     \
-  X(PFNGLCREATETEXTURESPROC, CreateTextures)                 \
-  X(PFNGLDELETEBUFFERSPROC, DeleteBuffers)                   \
-  X(PFNGLDELETEPROGRAMPROC, DeleteProgram)                   \
-  X(PFNGLDELETESHADERPROC, DeleteShader)                     \
-  X(PFNGLDELETETEXTURESPROC, DeleteTextures)                 \
-  X(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)               \
-  X(PFNGLFINISHPROC, Finish)                                 \
-  X(PFNGLGETERRORPROC, GetError)                             \
-  X(PFNGLGETGRAPHICSRESETSTATUSPROC, GetGraphicsResetStatus) \
-  X(PFNGLGETINTEGER64VPROC, GetInteger64v)                   \
-  X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)           \
-  X(PFNGLGETPROGRAMIVPROC, GetProgramiv)                     \
-  X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)             \
-  X(PFNGLGETSHADERIVPROC, GetShaderiv)                       \
-  X(PFNGLGETSTRINGPROC, GetString)                           \
-  X(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)         \
-  X(PFNGLLINKPROGRAMPROC, LinkProgram)                       \
-  X(PFNGLMAPNAMEDBUFFERRANGEPROC, MapNamedBufferRange)       \
-  X(PFNGLMEMORYBARRIERPROC, MemoryBarrier)                   \
-  X(PFNGLNAMEDBUFFERDATAPROC, NamedBufferData)               \
-  X(PFNGLNAMEDBUFFERSTORAGEPROC, NamedBufferStorage)         \
-  X(PFNGLNAMEDBUFFERSUBDATAPROC, NamedBufferSubData)         \
-  X(PFNGLSHADERSOURCEPROC, ShaderSource)                     \
-  X(PFNGLTEXTUREBUFFERPROC, TextureBuffer)                   \
-  X(PFNGLUNIFORM1FVPROC, Uniform1fv)                         \
-  X(PFNGLUNIFORM1IPROC, Uniform1i)                           \
-  X(PFNGLUSEPROGRAMPROC, UseProgram)
+#define LEVELSMITH_GL_FUNCTIONS(X)                                       \
+  X(PFNGLATTACHSHADERPROC, AttachShader)                                 \
+  X(PFNGLBINDBUFFERPROC, BindBuffer)                                     \
+  X(PFNGLBINDBUFFERBASEPROC, BindBufferBase)                             \
+  X(PFNGLBINDFRAMEBUFFERPROC, BindFramebuffer)                           \
+  X(PFNGLBINDTEXTUREUNITPROC, BindTextureUnit)                           \
+  X(PFNGLBINDVERTEXARRAYPROC, BindVertexArray)                           \
+  X(PFNGLCHECKNAMEDFRAMEBUFFERSTATUSPROC, CheckNamedFramebufferStatus)   \
+  X(PFNGLCLEARNAMEDFRAMEBUFFERFVPROC, ClearNamedFramebufferfv)           \
+  X(PFNGLCLIPCONTROLPROC, ClipControl)                                   \
+  X(PFNGLCOMPILESHADERPROC, CompileShader)                               \
+  X(PFNGLCOPYNAMEDBUFFERSUBDATAPROC, CopyNamedBufferSubData)             \
+  X(PFNGLCREATEBUFFERSPROC, CreateBuffers)                               \
+  X(PFNGLCREATEFRAMEBUFFERSPROC, CreateFramebuffers)                     \
+  X(PFNGLCREATEPROGRAMPROC, CreateProgram)                               \
+  X(PFNGLCREATERENDERBUFFERSPROC, CreateRenderbuffers)                   \
+  X(PFNGLCREATESHADERPROC, CreateShader)                                 \
+  X(PFNGLCREATETEXTURESPROC, CreateTextures)                             \
+  X(PFNGLCREATEVERTEXARRAYSPROC, CreateVertexArrays)                     \
+  X(PFNGLDELETEBUFFERSPROC, DeleteBuffers)                               \
+  X(PFNGLDELETEFRAMEBUFFERSPROC, DeleteFramebuffers)                     \
+  X(PFNGLDELETEPROGRAMPROC, DeleteProgram)                               \
+  X(PFNGLDELETERENDERBUFFERSPROC, DeleteRenderbuffers)                   \
+  X(PFNGLDELETESHADERPROC, DeleteShader)                                 \
+  X(PFNGLDELETETEXTURESPROC, DeleteTextures)                             \
+  X(PFNGLDELETEVERTEXARRAYSPROC, DeleteVertexArrays)                     \
+  X(PFNGLDEPTHFUNCPROC, DepthFunc)                                       \
+  X(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)                           \
+  X(PFNGLENABLEPROC, Enable)                                             \
+  X(PFNGLFINISHPROC, Finish)                                             \
+  X(PFNGLGETERRORPROC, GetError)                                         \
+  X(PFNGLGETGRAPHICSRESETSTATUSPROC, GetGraphicsResetStatus)             \
+  X(PFNGLGETINTEGER64VPROC, GetInteger64v)                               \
+  X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)                       \
+  X(PFNGLGETPROGRAMIVPROC, GetProgramiv)                                 \
+  X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)                         \
+  X(PFNGLGETSHADERIVPROC, GetShaderiv)                                   \
+  X(PFNGLGETSTRINGPROC, GetString)                                       \
+  X(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)                     \
+  X(PFNGLLINKPROGRAMPROC, LinkProgram)                                   \
+  X(PFNGLMAPNAMEDBUFFERRANGEPROC, MapNamedBufferRange)                   \
+  X(PFNGLMEMORYBARRIERPROC, MemoryBarrier)                               \
+  X(PFNGLMULTIDRAWELEMENTSINDIRECTPROC, MultiDrawElementsIndirect)       \
+  X(PFNGLNAMEDBUFFERDATAPROC, NamedBufferData)                           \
+  X(PFNGLNAMEDBUFFERSTORAGEPROC, NamedBufferStorage)                     \
+  X(PFNGLNAMEDBUFFERSUBDATAPROC, NamedBufferSubData)                     \
+  X(PFNGLNAMEDFRAMEBUFFERDRAWBUFFERSPROC, NamedFramebufferDrawBuffers)   \
+  X(PFNGLNAMEDFRAMEBUFFERREADBUFFERPROC, NamedFramebufferReadBuffer)     \
+  X(PFNGLNAMEDFRAMEBUFFERRENDERBUFFERPROC, NamedFramebufferRenderbuffer) \
+  X(PFNGLNAMEDRENDERBUFFERSTORAGEPROC, NamedRenderbufferStorage)         \
+  X(PFNGLPIXELSTOREIPROC, PixelStorei)                                   \
+  X(PFNGLREADPIXELSPROC, ReadPixels)                                     \
+  X(PFNGLSHADERSOURCEPROC, ShaderSource)                                 \
+  X(PFNGLTEXTUREBUFFERPROC, TextureBuffer)                               \
+  X(PFNGLUNIFORM1FVPROC, Uniform1fv)                                     \
+  X(PFNGLUNIFORM1IPROC, Uniform1i)                                       \
+  X(PFNGLUNIFORM2FVPROC, Uniform2fv)                                     \
+  X(PFNGLUNIFORM3FVPROC, Uniform3fv)                                     \
+  X(PFNGLUSEPROGRAMPROC, UseProgram)                                     \
+  X(PFNGLVERTEXARRAYELEMENTBUFFERPROC, VertexArrayElementBuffer)         \
+  X(PFNGLVIEWPORTPROC, Viewport)
 
 /// Pointers to the OpenGL functions of LEVELSMITH_GL_FUNCTIONS, named without the prefix "gl".
 struct GlFunctions {

@@ -3,10 +3,53 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <initializer_list>
+#include <vector>
 
 #include "levelset/error.h"
 
 namespace render {
+namespace {
+
+/// Text of a shader of a program.
+struct ShaderText {
+  GLenum kind;
+  const std::string& text;
+};
+
+/// @param remedy  end of the message for a failure; {} stands for the driver's log
+GLuint linkedProgram(const GlContext& context, std::initializer_list<ShaderText> texts,
+                     fmt::format_string<const char*> remedy) {
+  const GlFunctions& gl = context.gl();
+  const GLuint program = gl.CreateProgram();
+  std::vector<GLuint> shaders;
+  const auto refuse = [&](const char* what, auto getLog, GLuint object) {
+    char log[400] = "";
+    getLog(object, sizeof log, nullptr, log);
+    for (const GLuint shader : shaders) gl.DeleteShader(shader);
+    gl.DeleteProgram(program);
+    throw levelset::ResourceLimit(fmt::format("the graphics driver ({}) does not {} {}",
+                                              context.description(), what,
+                                              fmt::format(remedy, static_cast<const char*>(log))));
+  };
+  GLint isGood = 0;
+  for (const auto& [kind, text] : texts) {
+    const GLuint shader = shaders.emplace_back(gl.CreateShader(kind));
+    const char* lines = text.c_str();
+    gl.ShaderSource(shader, 1, &lines, nullptr);
+    gl.CompileShader(shader);
+    gl.GetShaderiv(shader, GL_COMPILE_STATUS, &isGood);
+    if (!isGood) refuse("compile", gl.GetShaderInfoLog, shader);
+    gl.AttachShader(program, shader);
+  }
+  gl.LinkProgram(program);
+  gl.GetProgramiv(program, GL_LINK_STATUS, &isGood);
+  if (!isGood) refuse("link", gl.GetProgramInfoLog, program);
+  for (const GLuint shader : shaders) gl.DeleteShader(shader);
+  return program;
+}
+
+}  // namespace
 
 Texels makeTexels(const GlContext& context, std::size_t largestTable, const void* data,
                   std::size_t bytes, GLenum format) {
@@ -72,29 +115,15 @@ void GrowingBuffer::release(const GlContext& context) {
 }
 
 GLuint compileCompute(const GlContext& context, const std::string& text) {
-  const GlFunctions& gl = context.gl();
-  const GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER), program = gl.CreateProgram();
-  const auto refuse = [&](const char* what, auto getLog, GLuint object) {
-    char log[400] = "";
-    getLog(object, sizeof log, nullptr, log);
-    gl.DeleteShader(shader);
-    gl.DeleteProgram(program);
-    throw levelset::ResourceLimit(fmt::format(
-        "the graphics driver ({}) does not {} the ray caster: {}; draw with --renderer cpu",
-        context.description(), what, log));
-  };
-  const char* lines = text.c_str();
-  gl.ShaderSource(shader, 1, &lines, nullptr);
-  gl.CompileShader(shader);
-  GLint isGood = 0;
-  gl.GetShaderiv(shader, GL_COMPILE_STATUS, &isGood);
-  if (!isGood) refuse("compile", gl.GetShaderInfoLog, shader);
-  gl.AttachShader(program, shader);
-  gl.LinkProgram(program);
-  gl.GetProgramiv(program, GL_LINK_STATUS, &isGood);
-  if (!isGood) refuse("link", gl.GetProgramInfoLog, program);
-  gl.DeleteShader(shader);
-  return program;
+  return linkedProgram(context, {{GL_COMPUTE_SHADER, text}},
+                       "the ray caster: {}; draw with --renderer cpu");
+}
+
+GLuint compileDrawing(const GlContext& context, const std::string& vertexText,
+                      const std::string& fragmentText) {
+  return linkedProgram(context,
+                       {{GL_VERTEX_SHADER, vertexText}, {GL_FRAGMENT_SHADER, fragmentText}},
+                       "the drawing of triangles: {}; use another driver");
 }
 
 }  // namespace render

@@ -60,5 +60,9 @@ class GrowingBuffer {
 /// @throws levelset::ResourceLimit when it does not compile or link; the message has the start of
 /// the driver's log
 [[nodiscard]] GLuint compileCompute(const GlContext& context, const std::string& text);
+/// Compiles and links a vertex and a fragment shader. Runs in a job of GlContext::run().
+/// @throws levelset::ResourceLimit as compileCompute()
+[[nodiscard]] GLuint compileDrawing(const GlContext& context, const std::string& vertexText,
+                                    const std::string& fragmentText);
 
 }  // namespace render
