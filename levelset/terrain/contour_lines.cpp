@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <unordered_map>
@@ -49,6 +50,21 @@ class ContourCells {
       for (; level != heights_.end() && *level <= most; ++level)
         addPieces(cell, column, row, static_cast<std::size_t>(level - heights_.begin()), take);
     }
+  }
+
+  /// Largest number of pieces in a row of cells.
+  [[nodiscard]] std::size_t mostPieces(int row) const {
+    std::size_t count = 0;
+    for (int column = 0; column + 1 < field_.columns; ++column) {
+      const terrain::GroundCell cell(field_, column, row);
+      if (!cell.isComplete()) continue;
+      const auto [least, most] =
+          std::minmax({cell.lowLow, cell.highLow, cell.lowHigh, cell.highHigh});
+      const auto from = std::upper_bound(heights_.begin(), heights_.end(), least);
+      // A cell has at most two pieces of a height.
+      count += 2 * static_cast<std::size_t>(std::upper_bound(from, heights_.end(), most) - from);
+    }
+    return count;
   }
 
   /// Position of the line on an edge.
@@ -114,13 +130,18 @@ struct GrowingLine {
   std::vector<Imath::V2d> front, back;            // points: `front` from its last one, then `back`
 
   [[nodiscard]] std::size_t size() const { return front.size() + back.size(); }
-  void append(const Imath::V2d& point) {
+  /// @return true if the point is not the last one already
+  bool append(const Imath::V2d& point) {
     const Imath::V2d* last = !back.empty() ? &back.back() : front.empty() ? nullptr : &front[0];
-    if (!last || *last != point) back.push_back(point);
+    if (last && *last == point) return false;
+    back.push_back(point);
+    return true;
   }
-  void prepend(const Imath::V2d& point) {
+  bool prepend(const Imath::V2d& point) {
     const Imath::V2d* first = !front.empty() ? &front.back() : back.empty() ? nullptr : &back[0];
-    if (!first || *first != point) front.push_back(point);
+    if (first && *first == point) return false;
+    front.push_back(point);
+    return true;
   }
   /// Takes the points of a line that begins at the last point of this one.
   void appendLine(const GrowingLine& next) {
@@ -155,17 +176,14 @@ class LineJoiner {
       if (lines_[line].isBeginFinal && lines_[line].isEndFinal) complete(line, false);
     } else if (before != kNoLine) {
       line = before;
-      lines_[line].append(cells_.crossing(piece.to, height));
-      ++points_;
+      points_ += lines_[line].append(cells_.crossing(piece.to, height));
     } else if (after != kNoLine) {
       line = after;
-      lines_[line].prepend(cells_.crossing(piece.from, height));
-      ++points_;
+      points_ += lines_[line].prepend(cells_.crossing(piece.from, height));
     } else {
       line = newLine(piece.level);
-      lines_[line].append(cells_.crossing(piece.from, height));
-      lines_[line].append(cells_.crossing(piece.to, height));
-      points_ += 2;
+      points_ += lines_[line].append(cells_.crossing(piece.from, height));
+      points_ += lines_[line].append(cells_.crossing(piece.to, height));
     }
     if (before == kNoLine) {
       lines_[line].from = piece.from;
@@ -259,8 +277,10 @@ class LineJoiner {
   /// copied, so that a point moves at most log n times.
   std::size_t join(std::size_t first, std::size_t second, int row) {
     GrowingLine &a = lines_[first], &b = lines_[second];
+    points_ -= a.size() + b.size();
     if (a.size() >= b.size()) {
       a.appendLine(b);
+      points_ += a.size();
       a.to = b.to;
       a.isEndFinal = b.isEndFinal;
       if (!a.isEndFinal) endsAt(a.to, row)[{a.to, a.level}] = first;
@@ -268,6 +288,7 @@ class LineJoiner {
       return first;
     }
     b.prependLine(a);
+    points_ += b.size();
     b.from = a.from;
     b.isBeginFinal = a.isBeginFinal;
     if (!b.isBeginFinal) beginsAt(b.from, row)[{b.from, b.level}] = second;
@@ -344,6 +365,9 @@ void forEachContourLine(const HeightField& field, const std::vector<double>& hei
   std::vector<std::vector<ContourPiece>> pieces(kRowsAtOnce);
   for (int first = 0; first < rows; first += kRowsAtOnce) {
     const int count = std::min(kRowsAtOnce, rows - first);
+    std::atomic<std::size_t> most = 0;
+    tbb::parallel_for(0, count, [&](int n) { most += cells.mostPieces(first + n); });
+    requireMemory(joiner.memoryUse() + static_cast<double>(most) * sizeof(ContourPiece), left);
     tbb::parallel_for(0, count, [&](int n) {
       std::vector<ContourPiece>& found = pieces[static_cast<std::size_t>(n)];
       found.clear();

@@ -42,7 +42,7 @@ PyramidPatch measurePatch(const HeightField& field, int cells, int level, int co
   const auto firstColumn = static_cast<int>(column * side), firstRow = static_cast<int>(row * side);
   for (int j = firstRow; j <= lastRow; ++j)
     for (int i = firstColumn; i <= lastColumn; ++i) {
-      const float height = field.at(i, j);
+      const float height = field.at(i, j) + 0.0F;  // zeros become positive
       if (std::isnan(height)) continue;
       patch.lowest = std::min(patch.lowest, height);
       patch.highest = std::max(patch.highest, height);

@@ -214,6 +214,12 @@ GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) 
 
 void writeGreyPng(const std::filesystem::path& path, int width, int height,
                   const std::uint8_t* topRow, std::ptrdiff_t rowStep, bool zeroIsClear) {
+  constexpr int kMostPixels = 1'000'000;  // of libpng, along a side
+  if (width > kMostPixels || height > kMostPixels)
+    throw InvalidInput(
+        fmt::format("a picture of {}x{} pixels is larger than {}, the limit of PNG "
+                    "files; crop it, or use fewer samples",
+                    width, height, kMostPixels));
   levelset::FileTarget target(path);
   const auto fail = [&](const std::string& why) {
     throw IoError(

@@ -30,6 +30,7 @@ struct GreyImage {
 /// the
 ///                    first one in memory
 /// @param zeroIsClear pixels of 0 are transparent
+/// @throws InvalidInput for more than a million pixels along a side
 /// @throws IoError when the file cannot be written; an old file of that name stays then
 void writeGreyPng(const std::filesystem::path& path, int width, int height,
                   const std::uint8_t* topRow, std::ptrdiff_t rowStep, bool zeroIsClear);

@@ -34,8 +34,6 @@ namespace {
 
 /// Blocks that GDAL keeps in memory, bytes.
 constexpr GIntBig kGdalCache = GIntBig{64} << 20;
-/// Rows that are read at once at most. Blocks of a file are seldom higher.
-constexpr int kMostRowsAtOnce = 512;
 
 /// Functions of GDAL, which is loaded while the program runs. Linking it would add a hundred
 /// libraries to the start of every program.
@@ -65,6 +63,8 @@ class Gdal {
   LEVELSMITH_GDAL_FUNCTION(GDALRasterIO);
   LEVELSMITH_GDAL_FUNCTION(GDALGetGeoTransform);
   LEVELSMITH_GDAL_FUNCTION(GDALGetSpatialRef);
+  LEVELSMITH_GDAL_FUNCTION(GDALGetDataTypeSizeBytes);
+  LEVELSMITH_GDAL_FUNCTION(GDALGetCacheMax64);
   LEVELSMITH_GDAL_FUNCTION(GDALSetCacheMax64);
   LEVELSMITH_GDAL_FUNCTION(OSRGetName);
   LEVELSMITH_GDAL_FUNCTION(OSRIsGeographic);
@@ -73,27 +73,55 @@ class Gdal {
   LEVELSMITH_GDAL_FUNCTION(OSRGetLinearUnits);
   LEVELSMITH_GDAL_FUNCTION(CPLErrorReset);
   LEVELSMITH_GDAL_FUNCTION(CPLGetLastErrorMsg);
+  LEVELSMITH_GDAL_FUNCTION(CPLPushErrorHandler);
+  LEVELSMITH_GDAL_FUNCTION(CPLPopErrorHandler);
+  CPLErrorHandler quiet = load<CPLErrorHandler>("CPLQuietErrorHandler");
 #undef LEVELSMITH_GDAL_FUNCTION
 
  private:
   Gdal() {
-    load<decltype(&::CPLSetErrorHandler)>("CPLSetErrorHandler")(
-        load<CPLErrorHandler>("CPLQuietErrorHandler"));
     load<decltype(&::GDALAllRegister)>("GDALAllRegister")();
-    GDALSetCacheMax64(kGdalCache);
   }
 
   template <typename Function>
   static Function load(const char* name) {
-    static void* library = dlopen(LEVELSMITH_HAS_GDAL, RTLD_NOW | RTLD_LOCAL);
+    static std::string reason;
+    static void* library = open(reason);
     void* symbol = library ? dlsym(library, name) : nullptr;
-    if (!symbol) {
-      const char* reason = dlerror();
+    if (!symbol)
       throw IoError(fmt::format("GDAL cannot be loaded ({}); install its library {}",
-                                reason ? reason : "unknown reason", LEVELSMITH_HAS_GDAL));
-    }
+                                library ? fmt::format("it has no {}", name) : reason,
+                                LEVELSMITH_HAS_GDAL));
     return reinterpret_cast<Function>(symbol);
   }
+  static void* open(std::string& reason) {
+    void* library = dlopen(LEVELSMITH_HAS_GDAL, RTLD_NOW | RTLD_LOCAL);
+    if (!library) reason = dlerror();
+    return library;
+  }
+};
+
+/// Keeps GDAL silent and its cache small for a while. The program may use GDAL, too.
+class GdalSettings {
+ public:
+  explicit GdalSettings(GIntBig cache) : cacheBefore_(gdal_.GDALGetCacheMax64()) {
+    gdal_.CPLPushErrorHandler(gdal_.quiet);
+    gdal_.GDALSetCacheMax64(cache);
+  }
+  ~GdalSettings() {
+    gdal_.GDALSetCacheMax64(cacheBefore_);
+    gdal_.CPLPopErrorHandler();
+  }
+  GdalSettings(const GdalSettings&) = delete;
+  GdalSettings& operator=(const GdalSettings&) = delete;
+
+  void needCache(GIntBig bytes) const {
+    if (bytes > gdal_.GDALGetCacheMax64()) gdal_.GDALSetCacheMax64(bytes);
+  }
+
+ private:
+  const Gdal& gdal_ = Gdal::instance();
+  GIntBig cacheBefore_;
 };
 
 class GdalGrid {
@@ -162,26 +190,25 @@ class GdalGrid {
   }
 
   void nameSystem(HeightField& field) {
+    // Slopes and volumes are wrong when heights and positions have different units.
+    const std::string unit = gdal_.GDALGetRasterUnitType(band_);
+    constexpr std::array<std::string_view, 6> metres = {"",      "m",      "metre",
+                                                        "meter", "metres", "meters"};
+    if (std::find(metres.begin(), metres.end(), unit) == metres.end())
+      note(fmt::format("heights are in '{}'; 'terrain --scale' converts them", unit.substr(0, 40)));
     const OGRSpatialReferenceH system = gdal_.GDALGetSpatialRef(set_.get());
     if (!system) return;
     if (const char* name = gdal_.OSRGetName(system)) field.coordinateSystem = name;
     field.isGeographic = gdal_.OSRIsGeographic(system) != 0;
-    if (field.isGeographic) {
-      constexpr double kDegree = std::numbers::pi / 180;
-      if (std::abs(gdal_.OSRGetAngularUnits(system, nullptr) - kDegree) > 1e-9 * kDegree)
-        fail("its positions are angles in other units than degrees; convert it with 'gdalwarp'");
+    if (!field.isGeographic) {
+      if (const double length = gdal_.OSRGetLinearUnits(system, nullptr); length != 1)
+        note(fmt::format("a unit of x and y is {:.9g} m; 'terrain --scale' gives heights this unit",
+                         length));
       return;
     }
-    // Slopes and volumes are wrong when heights and positions have different units.
-    const std::string heights = gdal_.GDALGetRasterUnitType(band_);
-    const double length =
-        gdal_.OSRIsProjected(system) ? gdal_.OSRGetLinearUnits(system, nullptr) : 1;
-    const bool inMetres = heights.empty() || heights == "m" || heights == "metre";
-    if (length != 1 || !inMetres)
-      note(
-          fmt::format("a unit of x and y is {:.9g} m, and heights are in {}; use 'terrain --scale' "
-                      "if they differ",
-                      length, heights.empty() ? "unknown units" : "'" + heights + "'"));
+    constexpr double kDegree = std::numbers::pi / 180;
+    if (std::abs(gdal_.OSRGetAngularUnits(system, nullptr) - kDegree) > 1e-9 * kDegree)
+      fail("its positions are angles in other units than degrees; convert it with 'gdalwarp'");
   }
 
   void readRows(GDALRasterBandH band, int row, int count, int columns, std::vector<double>& out) {
@@ -194,13 +221,18 @@ class GdalGrid {
   void takeHeights(HeightField& field) {
     int blockColumns = 0, blockRows = 0;
     gdal_.GDALGetBlockSize(band_, &blockColumns, &blockRows);
-    // A file of one strip is decoded once and kept by GDAL, whatever its rows are read in.
-    const int atOnce = std::clamp(blockRows >= field.rows ? 1 : blockRows, 1, kMostRowsAtOnce);
+    const int atOnce = blockRows >= field.rows ? 1 : std::max(1, blockRows);
     const auto width = static_cast<std::size_t>(field.columns);
-    const bool hasMask = (gdal_.GDALGetMaskFlags(band_) & GMF_PER_DATASET) != 0;
+    const bool hasMask = (gdal_.GDALGetMaskFlags(band_) & (GMF_ALL_VALID | GMF_NODATA)) == 0;
+    // GDAL decodes whole blocks. Those of a row stay in its cache, or they are decoded again.
+    const double blocks =
+        std::ceil(static_cast<double>(width) / blockColumns) * blockColumns * blockRows *
+        (gdal_.GDALGetDataTypeSizeBytes(gdal_.GDALGetRasterDataType(band_)) + (hasMask ? 1 : 0));
     const double buffer = static_cast<double>(width) * atOnce * sizeof(double);
-    requireHeightMemory(field, (hasMask ? 2 : 1) * buffer + static_cast<double>(kGdalCache),
-                        options_.maxMemory);
+    requireHeightMemory(
+        field, (hasMask ? 2 : 1) * buffer + std::max(2 * blocks, static_cast<double>(kGdalCache)),
+        options_.maxMemory);
+    settings_.needCache(static_cast<GIntBig>(2 * blocks));
     int known = 0;
     const double offset = gdal_.GDALGetRasterOffset(band_, &known);
     double scale = gdal_.GDALGetRasterScale(band_, &known);
@@ -241,6 +273,7 @@ class GdalGrid {
   }
 
   const Gdal& gdal_ = Gdal::instance();
+  GdalSettings settings_{kGdalCache};
   const std::filesystem::path& path_;
   const ReadHeightFieldOptions& options_;
   std::unique_ptr<void, Close> set_;
@@ -254,6 +287,12 @@ HeightField readGdalGrid(const std::filesystem::path& path, std::string_view for
                          const ReadHeightFieldOptions& options) {
   if (path == "-")
     throw UsageError(fmt::format("'{}' cannot be read from standard input; give a file", format));
+  std::error_code ignored;
+  if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
+    throw UsageError(
+        fmt::format("{} is no regular file, but '{}' is read at several places; give a "
+                    "file",
+                    inputName(path), format));
   // Reports a file that is missing or cannot be opened as other readers do.
   static_cast<void>(MappedFile(path, options.maxMemory, false));
   return GdalGrid(path, format, options).read();

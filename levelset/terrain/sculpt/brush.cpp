@@ -35,6 +35,13 @@ class BrushedPart {
     });
   }
 
+  /// Returns false if the brush lies between the samples, or on missing ones only.
+  [[nodiscard]] bool hasWeight() const {
+    for (std::size_t n = 0; n < weights_.size(); ++n)
+      if (weights_[n] > 0 && !std::isnan(heights_[n])) return true;
+    return false;
+  }
+
   void run() {
     switch (dab_.effect) {
       case BrushEffect::Raise:
@@ -179,20 +186,19 @@ void requireDab(const BrushDab& dab) {
 }
 
 SampleRange dabRange(const HeightField& field, const BrushDab& dab) {
-  const auto clampedSample = [](double position, double origin, double spacing, int count) {
-    return static_cast<int>(std::clamp((position - origin) / spacing, -1.0, count + 0.0));
+  const Imath::V2d low = (dab.center - Imath::V2d(dab.radius) - field.origin) / field.spacing,
+                   high = (dab.center + Imath::V2d(dab.radius) - field.origin) / field.spacing;
+  // Samples on the rim have no weight. They are neighbours of those with weight.
+  const auto first = [](double at, int count) {
+    return static_cast<int>(std::floor(std::clamp(at, 0.0, count + 0.0)));
   };
-  SampleRange range;
-  const Imath::V2d low = dab.center - Imath::V2d(dab.radius),
-                   high = dab.center + Imath::V2d(dab.radius);
-  range.firstColumn =
-      std::max(0, clampedSample(low.x, field.origin.x, field.spacing.x, field.columns));
-  range.firstRow = std::max(0, clampedSample(low.y, field.origin.y, field.spacing.y, field.rows));
-  if (high.x < field.origin.x || high.y < field.origin.y) return {};
-  range.lastColumn = std::min(
-      field.columns - 1, clampedSample(high.x, field.origin.x, field.spacing.x, field.columns));
-  range.lastRow =
-      std::min(field.rows - 1, clampedSample(high.y, field.origin.y, field.spacing.y, field.rows));
+  const auto last = [](double at, int count) {
+    return static_cast<int>(std::ceil(std::clamp(at, -1.0, count - 1.0)));
+  };
+  const SampleRange range{.firstColumn = first(low.x, field.columns),
+                          .firstRow = first(low.y, field.rows),
+                          .lastColumn = last(high.x, field.columns),
+                          .lastRow = last(high.y, field.rows)};
   return range.isEmpty() ? SampleRange() : range;
 }
 
@@ -200,9 +206,11 @@ SampleRange applyDab(HeightField& field, const BrushDab& dab, std::size_t maxMem
   requireDab(dab);
   const SampleRange range = dabRange(field, dab);
   if (range.isEmpty()) return range;
+  if (dab.effect == BrushEffect::Erode) requireLengths(field);
   requireMemory(3.0 * sizeof(double) * range.columns() * range.rows(),
                 memoryLeft(memoryLimit(maxMemory)));
   BrushedPart part(field, dab, range);
+  if (!part.hasWeight()) return {};
   part.run();
   part.writeTo(field);
   return range;

@@ -30,7 +30,7 @@ struct BrushDab {
   std::optional<double> level =
       {};                    ///< Flatten: height; default: the weighted mean below the brush
   double wavelength = 0;     ///< Noise: size of its features, world units; 0: radius / 4
-  double talusDegrees = 33;  ///< Erode: steepest slope that stays, from 0 to 90
+  double talusDegrees = 33;  ///< Erode: steepest slope that stays, from 0 to below 90
   int passes = 8;            ///< Smooth and Erode: number of steps, from 1 to 1000
   std::uint32_t seed = 0;    ///< Noise: number of the pattern
 };
@@ -38,13 +38,16 @@ struct BrushDab {
 /// Checks a dab. @throws UsageError for a number out of range
 void requireDab(const BrushDab& dab);
 
-/// Samples that a dab may change; empty if the brush is beside the field.
+/// Samples that a dab may change, with a border that it does not change; empty if the brush is
+/// beside the field.
 [[nodiscard]] SampleRange dabRange(const HeightField& field, const BrushDab& dab);
 
 /// Applies a dab. Missing samples stay missing. The same bits for any number of threads.
-/// @return dabRange()
+/// @return dabRange(); empty if no known sample is below the brush
 /// @throws UsageError as requireDab()
-/// @throws InvalidInput if a height would exceed the range of float; the field is unchanged then
+/// @throws InvalidInput for Erode on a field in degrees
+/// @throws InvalidInput, too, if a height would exceed the range of float; the field is unchanged
+/// then
 /// @throws ResourceLimit
 SampleRange applyDab(HeightField& field, const BrushDab& dab,
                      std::size_t maxMemory = kNoMemoryLimit);

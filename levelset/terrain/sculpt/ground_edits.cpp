@@ -86,7 +86,8 @@ void GroundChanges::add(const SampleRange& changed) {
 
 void GroundChanges::add(const GroundEdits& edits) {
   for (const GroundEdits::Tile& tile : edits.tiles)
-    hasChanged_[tile.row * tileColumns_ + tile.column] = true;
+    if (tile.column < tileColumns_ && tile.row < hasChanged_.size() / tileColumns_)
+      hasChanged_[tile.row * tileColumns_ + tile.column] = true;
 }
 
 GroundEdits GroundChanges::edits(const HeightField& field) const {

@@ -38,9 +38,10 @@ void forEachSquare(const SampleRange& range, int grain, const Function& function
                     });
 }
 
+/// Zeros become positive, so that the order of the heights does not matter.
 void include(PyramidPatch& patch, float lowest, float highest) {
-  patch.lowest = std::fmin(patch.lowest, lowest);
-  patch.highest = std::fmax(patch.highest, highest);
+  patch.lowest = std::fmin(patch.lowest, lowest + 0.0F);
+  patch.highest = std::fmax(patch.highest, highest + 0.0F);
 }
 
 }  // namespace
@@ -48,14 +49,14 @@ void include(PyramidPatch& patch, float lowest, float highest) {
 PyramidErrors::PyramidErrors(const HeightField& field, const PyramidOptions& options) {
   requireHeights(field);
   pyramid_ = unmeasuredPyramid(field.columns, field.rows, options.cells, options.maxMemory);
-  requireMemory(static_cast<double>(field.heights.size()) * sizeof(float) / 3,
-                memoryLeft(memoryLimit(options.maxMemory)));
   const SampleRange all{.lastColumn = field.columns - 1, .lastRow = field.rows - 1};
   cells_.resize(pyramid_.levels.size());
   for (std::size_t level = 1; level < cells_.size(); ++level) {
     CellLevel& cells = cells_[level];
     cells.columns = ((field.columns - 2) >> level) + 1;
     cells.rows = ((field.rows - 2) >> level) + 1;
+    requireMemory(static_cast<double>(cells.columns) * cells.rows * sizeof(float),
+                  memoryLeft(memoryLimit(options.maxMemory)));
     cells.errors.resize(static_cast<std::size_t>(cells.columns) *
                         static_cast<std::size_t>(cells.rows));
   }

@@ -10,7 +10,8 @@
 namespace levelset::terrain {
 
 /// A pyramid of a ground that changes, with the errors of all coarse cells. They let an update
-/// measure again only the cells below the change. They take 4/3 bytes for each sample.
+/// measure again only the cells below the change. They take 4/3 bytes for each sample, and at
+/// most 4 for narrow fields.
 class PyramidErrors {
  public:
   /// @throws as heightPyramid()

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -34,11 +35,15 @@ struct HeightChange {
   }
 };
 
-using Stroke = std::vector<HeightChange>;
+/// Tiles that a stroke changes, each one as it was before the first dab. So a stroke takes at most
+/// the memory of the field.
+struct Stroke {
+  std::map<std::pair<int, int>, HeightChange> tiles;  // by row and column
+};
 
 inline std::size_t bytesOf(const Stroke& stroke) {
   std::size_t bytes = 0;
-  for (const HeightChange& change : stroke)
+  for (const auto& [place, change] : stroke.tiles)
     bytes += sizeof change + change.heights.size() * sizeof(float);
   return bytes;
 }
@@ -61,18 +66,29 @@ struct SculptedGround::State {
         undoMemory(options.undoMemory),
         maxMemory(options.maxMemory) {}
 
-  /// Exchanges the heights of a stroke. @param isForward  the first change goes first
-  SampleRange exchange(terrain::Stroke& stroke, bool isForward) {
-    if (isForward)
-      for (auto change = stroke.begin(); change != stroke.end(); ++change) change->swapWith(field);
-    else
-      for (auto change = stroke.rbegin(); change != stroke.rend(); ++change)
-        change->swapWith(field);
+  /// Adds the tiles of a range to a stroke, with their heights, unless they are in `has`.
+  void keepTiles(const SampleRange& range, terrain::Stroke& to, const terrain::Stroke& has) const {
+    for (int row = range.firstRow / kEditTile; row <= range.lastRow / kEditTile; ++row)
+      for (int column = range.firstColumn / kEditTile; column <= range.lastColumn / kEditTile;
+           ++column) {
+        if (has.tiles.contains({row, column})) continue;
+        const SampleRange tile{.firstColumn = column * kEditTile,
+                               .firstRow = row * kEditTile,
+                               .lastColumn = std::min((column + 1) * kEditTile, field.columns) - 1,
+                               .lastRow = std::min((row + 1) * kEditTile, field.rows) - 1};
+        to.tiles.try_emplace({row, column}, field, tile);
+      }
+  }
+
+  /// Exchanges the heights of a stroke.
+  SampleRange exchange(terrain::Stroke& stroke) {
     SampleRange changed;
-    for (const terrain::HeightChange& change : stroke) {
-      errors->update(field, change.range);
+    for (auto& [place, change] : stroke.tiles) {
+      change.swapWith(field);
       changed = terrain::united(changed, change.range);
     }
+    // Tiles share patches, so all heights are exchanged first.
+    for (const auto& [place, change] : stroke.tiles) errors->update(field, change.range);
     return changed;
   }
 
@@ -122,16 +138,19 @@ void SculptedGround::beginStroke() {
 
 SampleRange SculptedGround::apply(const BrushDab& dab) {
   requireDab(dab);
-  const SampleRange range = dabRange(state_->field, dab);
+  const SampleRange reached = dabRange(state_->field, dab);
+  if (reached.isEmpty()) return reached;
+  const terrain::Stroke none;
+  terrain::Stroke kept;
+  state_->keepTiles(reached, kept, state_->startsStroke ? none : state_->done.back());
+  const SampleRange range = applyDab(state_->field, dab, state_->maxMemory);
   if (range.isEmpty()) return range;
-  terrain::HeightChange change(state_->field, range);
-  applyDab(state_->field, dab, state_->maxMemory);
   if (std::exchange(state_->startsStroke, false)) {
     state_->done.emplace_back();
     state_->undone.clear();
   }
-  state_->undoBytes += sizeof change + change.heights.size() * sizeof(float);
-  state_->done.back().push_back(std::move(change));
+  state_->undoBytes += terrain::bytesOf(kept);
+  state_->done.back().tiles.merge(kept.tiles);
   state_->limitUndo();
   state_->changes.add(range);
   state_->errors->update(state_->field, range);
@@ -152,7 +171,7 @@ SampleRange SculptedGround::undo() {
   state_->undone.push_back(std::move(state_->done.back()));
   state_->done.pop_back();
   state_->undoBytes -= terrain::bytesOf(state_->undone.back());
-  return state_->exchange(state_->undone.back(), false);
+  return state_->exchange(state_->undone.back());
 }
 
 SampleRange SculptedGround::redo() {
@@ -161,7 +180,7 @@ SampleRange SculptedGround::redo() {
   state_->done.push_back(std::move(state_->undone.back()));
   state_->undone.pop_back();
   state_->undoBytes += terrain::bytesOf(state_->done.back());
-  return state_->exchange(state_->done.back(), true);
+  return state_->exchange(state_->done.back());
 }
 
 GroundEdits SculptedGround::edits() const {

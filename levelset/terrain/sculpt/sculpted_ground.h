@@ -11,7 +11,8 @@ namespace levelset {
 
 struct SculptOptions {
   int cells = 64;  ///< cells along a side of a patch of the pyramid, as in PyramidOptions
-  /// Bytes for undo and redo. The oldest strokes are dropped beyond it, but not the last one.
+  /// Bytes for undo and redo. The oldest strokes are dropped beyond it, but not the last one. A
+  /// stroke keeps each tile of kEditTile² samples once.
   std::size_t undoMemory = std::size_t{256} << 20;
   const GroundEdits* edits = nullptr;  ///< earlier edits of the field, applied first; may be null
   std::size_t maxMemory = kNoMemoryLimit;

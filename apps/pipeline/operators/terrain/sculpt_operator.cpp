@@ -9,6 +9,7 @@
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
+#include "levelset/file_target.h"
 #include "levelset/terrain/sculpt/sculpted_ground.h"
 
 namespace pipeline {
@@ -31,20 +32,40 @@ BrushEffect effectOf(const std::string& brush) {
   return BrushEffect::Erode;
 }
 
-/// The line through the points, or the points alone.
+/// Sum of the weights at a point of a long straight stroke, over the dabs along it.
+double strokeWeight() {
+  double sum = 0;
+  for (int k = -3; k <= 3; ++k) {
+    const double share = 1 - k * k * kDabDistance * kDabDistance;
+    sum += share * share;
+  }
+  return sum;
+}
+
+/// The points, or places along the line through them at equal distances. The last point is always
+/// among them.
 std::vector<Imath::V3d> dabPlaces(Invocation& in, double radius) {
   const std::vector<Imath::V3d> points = in.points("at");
   if (!in.flag("stroke")) return points;
+  const double distance = kDabDistance * radius;
   std::vector<Imath::V3d> places = {points.front()};
+  double toNext = distance;  // along the line, from the begin of the segment
   for (std::size_t n = 1; n < points.size(); ++n) {
     const Imath::V3d step = points[n] - points[n - 1];
-    const double count = std::ceil(std::hypot(step.x, step.y) / (kDabDistance * radius));
-    if (!(count + static_cast<double>(places.size()) <= kMostDabs))
+    const double length = std::hypot(step.x, step.y);
+    if (!(length / distance + static_cast<double>(places.size()) <= kMostDabs))
       throw UsageError(fmt::format(
           "sculpt: the line needs more than {:.0f} dabs; give a larger --radius", kMostDabs));
-    for (int k = 1; k < count; ++k) places.push_back(points[n - 1] + step * (k / count));
-    places.push_back(points[n]);
+    for (; toNext <= length; toNext += distance)
+      places.push_back(points[n - 1] + step * (toNext / length));
+    toNext -= length;
   }
+  // Rounding may leave the last point out.
+  const Imath::V3d rest = points.back() - places.back();
+  if (std::hypot(rest.x, rest.y) > 1e-9 * distance)
+    places.push_back(points.back());
+  else
+    places.back() = points.back();
   return places;
 }
 
@@ -57,6 +78,9 @@ Value sculpt(Invocation& in) {
   if (in.given("wavelength")) dab.wavelength = in.length("wavelength");
   dab.talusDegrees = in.number("talus");
   const std::vector<Imath::V3d> places = dabPlaces(in, dab.radius);
+  const bool isSum = dab.effect == BrushEffect::Raise || dab.effect == BrushEffect::Noise;
+  if (in.flag("stroke") && isSum) dab.strength /= strokeWeight();
+  levelset::requireLengths(in.operands[0].terrain());
   HeightField terrain = in.operands[0].terrain();
   levelset::GroundChanges changes(terrain);
   std::size_t beside = 0;
@@ -73,7 +97,9 @@ Value sculpt(Invocation& in) {
   }
   if (beside == places.size())
     in.notes.warnings.push_back(
-        "sculpt: the brush is beside the terrain and changes nothing; give other positions");
+        "sculpt: no sample is below the brush, so nothing changes; give other positions, or a "
+        "larger "
+        "--radius");
   in.notes.detailsJson = Json{{"dabs", places.size()}, {"dabs_beside", beside}}.dump();
   if (in.given("edits")) levelset::writeGroundEdits(in.text("edits"), changes.edits(terrain));
   return Value(std::move(terrain));
@@ -138,8 +164,8 @@ Operator sculptOperator() {
                  {.name = "stroke",
                   .type = ParamType::Flag,
                   .doc =
-                      "move the brush along the line through the positions, in steps of a quarter "
-                      "of the radius"},
+                      "move the brush along the line through the positions; raise and noise change "
+                      "the middle of a straight line by the strength"},
                  {.name = "radius",
                   .type = ParamType::Length,
                   .doc = "radius R of the brush",
@@ -183,18 +209,33 @@ Operator sculptOperator() {
       .plan =
           [](Invocation& in) {
             Plan plan = in.operands[0].plan();
-            // Raised ground leaves the old heights.
-            const double most = std::abs(in.number("strength"));
-            if (!plan.bounds.isEmpty()) {
+            if (plan.bounds.isEmpty()) return plan;
+            const std::string brush = in.text("brush");
+            const std::vector<Imath::V3d> points = in.points("at");
+            const auto include = [&](double z) {
+              plan.bounds.min.z = std::min(plan.bounds.min.z, z);
+              plan.bounds.max.z = std::max(plan.bounds.max.z, z);
+            };
+            if (brush == "raise" || brush == "noise") {
+              // Dabs at one position add up.
+              const double most = std::abs(in.number("strength")) *
+                                  (in.flag("stroke") ? 2.0 : static_cast<double>(points.size()));
               plan.bounds.min.z -= most;
               plan.bounds.max.z += most;
             }
+            if (in.given("level")) include(in.number("level"));
+            if (in.flag("to-points"))
+              for (const Imath::V3d& p : points) include(p.z);
             return plan;
           },
       .validate = validateSculpt,
       .targets =
           [](const Invocation& in) {
             return in.given("edits") ? std::vector{in.text("edits")} : std::vector<std::string>();
+          },
+      .usesStandardOutput =
+          [](const Invocation& in) {
+            return in.given("edits") && levelset::isStandardOutput(in.text("edits"));
           },
   };
 }

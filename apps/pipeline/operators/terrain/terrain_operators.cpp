@@ -56,8 +56,10 @@ HeightField sourceOf(Invocation& in) {
 
 Value makeTerrain(Invocation& in) {
   HeightField terrain = sourceOf(in);
-  if (in.given("edits"))
-    levelset::applyEdits(terrain, levelset::readGroundEdits(in.text("edits"), in.maxMemory));
+  if (in.given("edits")) {
+    const levelset::GroundEdits edits = levelset::readGroundEdits(in.text("edits"), in.maxMemory);
+    levelset::withContext(in.text("edits"), [&] { levelset::applyEdits(terrain, edits); });
+  }
   if (in.flag("flip")) terrain = levelset::flippedHeights(std::move(terrain));
   terrain = placedTerrain(in, std::move(terrain));
   if (in.given("crop")) terrain = levelset::croppedHeights(terrain, in.box("crop"));

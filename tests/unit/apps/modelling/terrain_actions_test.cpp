@@ -250,7 +250,21 @@ TEST_F(TerrainActions, SculptChangesHeights) {
   const support::Outcome beside =
       levelsmith("read plane.asc ! sculpt --brush raise --at 99,2,0 --radius 1 --strength 3");
   EXPECT_EQ(beside.code, 0);
-  EXPECT_NE(beside.err.find("beside the terrain"), std::string::npos);
+  EXPECT_NE(beside.err.find("no sample is below the brush"), std::string::npos);
+  // Along a straight line, the middle rises by the strength; further points of the line do not
+  // count.
+  ASSERT_EQ(
+      shell("awk 'BEGIN { print \"ncols 101\\nnrows 41\\nxllcenter 0\\nyllcenter 0\\ncellsize 1\"; "
+            "for (n = 0; n < 4141; ++n) print 0 }' > flat.asc")
+          .code,
+      0);
+  for (const char* line : {"0,20,0 100,20,0", "0,20,0 1,20,0 2,20,0 50.5,20,0 100,20,0"}) {
+    const Json stroke = json(std::string("read flat.asc ! sculpt --brush raise --stroke --radius 8 "
+                                         "--strength 3 --at '") +
+                             line + "' ! terrain --crop '30,20,0 70,20,0' ! info --json");
+    EXPECT_NEAR(stroke["range"][0], 3, support::measured(0.006));
+    EXPECT_NEAR(stroke["range"][1], 3, support::measured(0.006));
+  }
   const std::string brush = "read plane.asc ! sculpt --at 4,2,0 --radius 1 --strength 0.5 --brush ";
   expectRefusal(brush + "raise --talus 3", 2, "--talus has no meaning for --brush raise");
   expectRefusal(brush + "erode --talus 90", 2, "--talus");

@@ -185,6 +185,13 @@ TEST(ContourLines, RefuseHeightsAndTooLittleMemory) {
   EXPECT_SAYS(refusal<levelset::ResourceLimit>(
                   [&] { static_cast<void>(contourLines(field, {0.5}, {.maxMemory = 10'000})); }),
               "");
+  // Lines through samples have equal points, which are left out and take no memory.
+  const HeightField steps = terrainOf(
+      300, 300, {1, 1}, [](double x, double y) { return std::floor(x / 3) + std::floor(y / 5); });
+  std::size_t lines = 0;
+  levelset::forEachContourLine(steps, {-20, -10, 0, 10, 20}, [&](const ContourLine&) { ++lines; },
+                               {.maxMemory = 400'000});
+  EXPECT_EQ(lines, 5u);
   const HeightField row = support::randomTerrain(50, 1, 0, 1);
   EXPECT_TRUE(contourLines(row, {0.5}).empty());
 }

@@ -67,6 +67,13 @@ TEST(SculptedGround, PyramidEqualsOneThatIsBuiltAgain) {
   }
 }
 
+TEST(SculptedGround, PyramidHasPositiveZeros) {
+  HeightField field = randomTerrain(20, 20, 0, 3);
+  for (std::size_t n = 0; n < field.heights.size(); ++n) field.heights[n] = n % 3 ? 0.0F : -0.0F;
+  SculptedGround ground(field, {.cells = 2});
+  EXPECT_TRUE(haveSameBits(ground.pyramid(), levelset::heightPyramid(field, {.cells = 2})));
+}
+
 TEST(SculptedGround, UndoAndRedoReturnTheBits) {
   std::mt19937 random(11);
   SculptedGround ground(randomTerrain(120, 90, 0.01, 4), {.cells = 16});
@@ -120,11 +127,13 @@ TEST(SlowSculptedGround, TenThousandStrokesAreUndone) {
 }
 
 TEST(SculptedGround, DropsTheOldestStrokesBeyondItsMemory) {
-  // A dab has about 21² samples of 4 bytes, so that five of them fit.
-  SculptedGround ground(randomTerrain(100, 100, 0, 1), {.undoMemory = 5 * 1900});
+  // The dab lies in the first tile, which has 16 KiB, so that five of them fit.
+  SculptedGround ground(randomTerrain(100, 100, 0, 1), {.undoMemory = 5 * 16500});
   for (int n = 0; n < 20; ++n) {
     ground.beginStroke();
-    ground.apply({.radius = 10, .strength = 1});
+    // A second dab at the same place takes no more memory.
+    for (int dab = 0; dab < 2; ++dab)
+      ground.apply({.center = {-20, -20}, .radius = 10, .strength = 1});
   }
   int count = 0;
   while (ground.canUndo()) {

@@ -196,6 +196,15 @@ TEST_F(GdalGrid, AppliesScaleAndOffset) {
   EXPECT_EQ(field.at(1, 0), 100);
 }
 
+TEST_F(GdalGrid, LeavesOutMaskedSamples) {
+  const Tiff heights = Tiff().image<float>(2, 2, {1, 2, 3, 4}).place(0, 0, 1, 1);
+  writeText(folder_ / "a.tif.msk", Tiff().image<std::uint8_t>(2, 2, {255, 0, 255, 255}).str());
+  const HeightField field = read(heights);
+  EXPECT_TRUE(field.isMissing(1, 1));
+  EXPECT_EQ(field.missingCount(), 1u);
+  EXPECT_EQ(field.at(0, 1), 1);
+}
+
 TEST_F(GdalGrid, RefusesGridsThatAreNoHeights) {
   Tiff turned;
   turned.image<float>(2, 2, {1, 2, 3, 4});
@@ -245,6 +254,8 @@ TEST_F(GdalGrid, RefusesDamagedFiles) {
     try {
       const HeightField field =
           readHeightField(folder_ / "a.tif", {.maxMemory = std::size_t{1} << 28});
+      // Damage of the heights is not seen, but a cut file has no heights that it lacks.
+      if (n % 3 == 0) EXPECT_EQ(std::count(field.heights.begin(), field.heights.end(), 7), 16);
       EXPECT_EQ(field.heights.size(),
                 static_cast<std::size_t>(field.columns) * static_cast<std::size_t>(field.rows));
       ++read;
