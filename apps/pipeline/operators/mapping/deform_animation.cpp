@@ -31,7 +31,7 @@
 #include "levelset/file_target.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/meshing/band_to_mesh.h"
-#include "render/bezier/bezier_keys.h"
+#include "render/bezier/keys/bezier_keys.h"
 #include "render/images/image.h"
 #include "render/views/bezier_file.h"
 

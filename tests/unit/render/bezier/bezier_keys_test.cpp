@@ -1,6 +1,6 @@
 // Bézier volumes between key frames.
 
-#include "render/bezier/bezier_keys.h"
+#include "render/bezier/keys/bezier_keys.h"
 
 #include <gtest/gtest.h>
 

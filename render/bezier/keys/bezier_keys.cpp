@@ -1,4 +1,4 @@
-#include "render/bezier/bezier_keys.h"
+#include "render/bezier/keys/bezier_keys.h"
 
 #include <fmt/core.h>
 
