@@ -91,6 +91,8 @@ std::vector<Operator> allOperators() {
       morphWithSegmentations(morphOperator()),
       transformWithSegmentations(transformOperator()),
       deformOperator(),
+      latticeOperator(),
+      cageOperator(),
       resampleOperator(),
       clipOperator(),
       patchOperator(),

@@ -159,6 +159,38 @@ py::object terrainArray(const py::object& owner, const levelset::HeightField& te
       .attr("reshape")(terrain.rows, terrain.columns);
 }
 
+levelset::ControlLattice latticeFromArray(const py::array& points, const Imath::Box3d& box,
+                                          const std::array<int, 3>& degree) {
+  if (points.dtype().kind() != 'f' || points.ndim() != 4 || points.shape(3) != 3)
+    throw InvalidInput(
+        fmt::format("Deformation: the array points has shape {}; give shape (l, m, n, 3) of "
+                    "float32 or float64",
+                    shapeText(points)));
+  const auto rows = py::array_t<double, py::array::c_style | py::array::forcecast>(points);
+  if (rows.size() / 3 > static_cast<py::ssize_t>(levelset::kMostControlPoints))
+    throw InvalidInput(fmt::format("Deformation: more than {} control points; give fewer",
+                                   levelset::kMostControlPoints));
+  return levelset::withContext("Deformation", [&] {
+    levelset::LatticeData data;
+    data.boxToWorld = levelset::frameOf(box);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto count = static_cast<std::size_t>(rows.shape(static_cast<py::ssize_t>(axis)));
+      const int usual = static_cast<int>(std::clamp<std::size_t>(count, 2, 4)) - 1;
+      data.axes[axis] = levelset::uniformAxis(degree[axis] != 0 ? degree[axis] : usual, count);
+    }
+    const double* p = rows.data();
+    for (py::ssize_t n = 0; n < rows.size(); n += 3, p += 3)
+      data.points.emplace_back(p[0], p[1], p[2]);
+    return levelset::ControlLattice(std::move(data));
+  });
+}
+
+py::object latticeArray(const py::object& owner, const levelset::ControlLattice& lattice) {
+  const levelset::LatticeData& data = lattice.data();
+  return rowsView<V3d, double, 3>(owner, data.points)
+      .attr("reshape")(data.axes[0].count(), data.axes[1].count(), data.axes[2].count(), 3);
+}
+
 py::array_t<double> distancesAt(const levelset::AdaptiveField& field, const py::array& points) {
   const auto places = floatRows(points, "distances", "points");
   const py::ssize_t count = places.shape(0);

@@ -54,6 +54,19 @@ namespace python {
 [[nodiscard]] pybind11::object terrainArray(const pybind11::object& owner,
                                             const levelset::HeightField& terrain);
 
+/// Builds a lattice from a numpy array.
+/// @param points  control points, l × m × n × 3 floats
+/// @param degree  along each axis, 0: 3, or less with fewer than 4 points
+/// @throws levelset::InvalidInput for other shapes and types, and as levelset::ControlLattice
+[[nodiscard]] levelset::ControlLattice latticeFromArray(const pybind11::array& points,
+                                                        const Imath::Box3d& box,
+                                                        const std::array<int, 3>& degree);
+
+/// Returns the control points of a lattice as a read-only numpy array that shares its memory.
+/// @param owner  Python object that keeps the lattice alive
+[[nodiscard]] pybind11::object latticeArray(const pybind11::object& owner,
+                                            const levelset::ControlLattice& lattice);
+
 /// Samples an adaptive field.
 /// @param points  n × 3 floats, world units
 /// @return n distances, float64; NaN for points that are not finite

@@ -115,6 +115,13 @@ MEMBERS = {
     @property
     def weights(self) -> Optional[NDArray[numpy.float32]]: ...
 ''',
+    "Deformation": '''
+    def __init__(
+        self, points: ArrayLike, box: ArrayLike, degree: Union[int, Sequence[int]] = 0
+    ) -> None: ...
+    @property
+    def points(self) -> Optional[NDArray[numpy.float64]]: ...
+''',
     "Terrain": '''
     def __init__(
         self, heights: ArrayLike, spacing: Tuple[float, float] = (1, 1), origin: Tuple[float, float] = (0, 0)

@@ -56,6 +56,8 @@ const char* className(Kind kind) {
       return "Molecule";
     case Kind::Terrain:
       return "Terrain";
+    case Kind::Deformation:
+      return "Deformation";
   }
   return "";
 }
@@ -101,6 +103,8 @@ const char* hintOf(ParamType type) {
       return "Speed";
     case ParamType::Mesh:
       return "Mesh";
+    case ParamType::Solid:
+      return "Solid";
   }
   return "";
 }
@@ -170,6 +174,7 @@ py::list describeOperators() {
     result["takes_more"] = op.takesMore;
     result["operands_optional"] = op.operandsOptional;
     result["first_alone"] = !op.aloneWith.empty();
+    result["may_take_none"] = !op.noneWith.empty();
     result["result"] = resultClasses(op);
     py::list operands, params;
     for (const std::vector<Kind>& kinds : op.operands) {
@@ -402,6 +407,15 @@ PYBIND11_MODULE(_core, module) {
              });
              return python::terrainArray(owner, value.terrain());
            })
+      .def("lattice_array",
+           [](const py::object& self) -> py::object {
+             const auto& value = valueOf(self.cast<const Handle&>());
+             if (!value.deformation().lattice()) return py::none();
+             const py::capsule owner(new pipeline::Value(value), [](void* held) {
+               delete static_cast<pipeline::Value*>(held);
+             });
+             return python::latticeArray(owner, *value.deformation().lattice());
+           })
       .def("terrain_place",
            [](const Handle& node) {
              const pipeline::Value value = valueOf(node);
@@ -471,6 +485,12 @@ PYBIND11_MODULE(_core, module) {
                            const std::array<double, 2>& origin) {
     return given(pipeline::Value(python::terrainFromArray(
         heights, Imath::V2d(spacing[0], spacing[1]), Imath::V2d(origin[0], origin[1]))));
+  });
+  module.def("lattice", [](const py::array& points, const Point& low, const Point& high,
+                           const std::array<int, 3>& degree) {
+    return given(
+        pipeline::Value(pipeline::DeformationValue{std::make_shared<levelset::LatticeDeformation>(
+            python::latticeFromArray(points, Imath::Box3d(toImath(low), toImath(high)), degree))}));
   });
   module.def("samples", [](const Point& origin, double voxel,
                            const py::array_t<std::int32_t, py::array::c_style>& blocks,

@@ -185,3 +185,30 @@ def test_pictures(ls, ball, tmp_path):
     ball.render(tmp_path / "a.png", size=(64, 48))
     assert struct.unpack(">II", (tmp_path / "a.png").read_bytes()[16:24]) == (64, 48)
     assert ball.mesh()._repr_png_()[:4] == b"\x89PNG"
+
+
+def test_deformations_are_values(ls, tmp_path):
+    bar = ls.box(size=(1, 1, 4), voxel=0.1)
+    bent = ls.lattice(bend=60, towards=(1, 0, 0), box=((-1, -1, -3), (1, 1, 3)))
+    assert isinstance(bent, ls.Deformation) and not bent.is_computed
+    moved = bar.deform(bent)
+    assert volume(moved) == pytest.approx(4, rel=1e-2)
+    bent.save(str(tmp_path / "bent.json"))
+    again = ls.read(str(tmp_path / "bent.json"))
+    assert isinstance(again, ls.Deformation)
+    assert bar.deform(again).info() == moved.info()
+    assert bent.info()["form"] == "lattice"
+    assert (again.points == bent.points).all() and bent.points.shape[3] == 3
+    rest = bar.lattice(count=(2, 3, 4), box=None)
+    assert rest.points.shape == (2, 3, 4, 3)
+    low, high = rest.points.reshape(-1, 3).min(0), rest.points.reshape(-1, 3).max(0)
+    wide = ls.Deformation(rest.points * (1.5, 1, 1), (low, high))
+    assert volume(bar.deform(wide)) == pytest.approx(6, rel=1e-2)
+    with pytest.raises(ls.InputError, match="shape"):
+        ls.Deformation(numpy.zeros((2, 2, 3)), (low, high))
+    around = bar.lattice(twist=30)
+    assert bar.deform(around).info() == bar.deform(twist=30).info()
+    with pytest.raises(ls.UsageError, match="needs 2 operands"):
+        bar.deform()
+    with pytest.raises(ls.UsageError, match="takes 1 operand"):
+        bar.deform(bent, twist=3)

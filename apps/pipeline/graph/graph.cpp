@@ -30,6 +30,8 @@ std::string mismatch(const Operator& op, std::size_t index, Kind found,
   if (found == Kind::Segmentation)
     remedy = takes(Kind::Band) ? "; put 'extract LABEL' before it" : "; put 'mesh' before it";
   if (found == Kind::Patch) remedy = "; 'texture' builds a level set from it";
+  if (found == Kind::Deformation)
+    remedy = "; 'deform' moves other values by it, and takes it as the last operand";
   if (found == Kind::Scene) remedy = "; 'render' draws it, 'write' saves it as .json";
   std::string kinds;
   for (std::size_t i = 0; i < allowed.size(); ++i)
@@ -42,6 +44,19 @@ std::string mismatch(const Operator& op, std::size_t index, Kind found,
                      kindPhrase(found), kinds, remedy);
 }
 
+/// Options that may replace the missing operands, as the end of a message.
+std::string optionsInPlace(const Operator& op, std::size_t found) {
+  const std::vector<std::string>& options = found == 0 ? op.noneWith : op.aloneWith;
+  std::string text;
+  for (std::size_t i = 0; i < options.size() && found < 2; ++i)
+    text += fmt::format("{}--{}",
+                        i == 0                    ? "; or give "
+                        : i + 1 == options.size() ? " or "
+                                                  : ", ",
+                        options[i]);
+  return text;
+}
+
 void checkOperands(const Node& node, const std::vector<Node>& before) {
   const Operator& op = *node.op;
   const std::size_t wanted = op.operandCount(node.options), found = node.inputs.size();
@@ -50,11 +65,11 @@ void checkOperands(const Node& node, const std::vector<Node>& before) {
                                  wanted == 1 ? "" : "s", found));
   }
   if (found < wanted && !op.operandsOptional) {
-    throw UsageError(
-        fmt::format("{}: needs {} operand{} but has {}; read or compute {} first, or name {} "
-                    "with '@'",
-                    op.name, wanted, wanted == 1 ? "" : "s", found,
-                    wanted - found == 1 ? "one" : "them", wanted - found == 1 ? "it" : "them"));
+    throw UsageError(fmt::format(
+        "{}: needs {} operand{} but has {}; read or compute {} first, or name {} "
+        "with '@'{}",
+        op.name, wanted, wanted == 1 ? "" : "s", found, wanted - found == 1 ? "one" : "them",
+        wanted - found == 1 ? "it" : "them", optionsInPlace(op, found)));
   }
   for (std::size_t i = 0; i < found; ++i) {
     const std::vector<Kind>& allowed = op.operands[std::min(i, op.operands.size() - 1)];
@@ -68,13 +83,16 @@ void checkNamed(const Node& node, const std::vector<Node>& before) {
   for (const auto& [option, number] : node.named) {
     const Node& value = before[number];
     const ParamType type = node.op->find(option)->type;
-    const bool isMesh = type == ParamType::Mesh, isScalar = takesDistance(type);
-    if (isMesh ? value.kind == Kind::Mesh
-               : value.kind == Kind::Field || (isScalar && value.kind == Kind::Band))
+    const bool isMesh = type == ParamType::Mesh, isSolid = type == ParamType::Solid,
+               isScalar = takesDistance(type);
+    if (isMesh    ? value.kind == Kind::Mesh
+        : isSolid ? value.kind == Kind::Band
+                  : value.kind == Kind::Field || (isScalar && value.kind == Kind::Band))
       continue;
     throw UsageError(fmt::format("{}: --{}: '@{}' is {}, but a {} is needed", node.op->name, option,
                                  value.name, kindPhrase(value.kind),
                                  isMesh     ? "mesh"
+                                 : isSolid  ? "level set"
                                  : isScalar ? "field or a level set"
                                             : "field"));
   }

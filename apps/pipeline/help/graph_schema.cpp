@@ -89,7 +89,8 @@ Json actionSchema(const Operator& op) {
   }
   Json inputs = {{"type", "array"}, {"items", nodeNumber()}};
   if (!op.takesMore) inputs["maxItems"] = op.operands.size();
-  if (!op.operandsOptional) inputs["minItems"] = op.aloneWith.empty() ? op.operands.size() : 1;
+  if (!op.operandsOptional)
+    inputs["minItems"] = !op.noneWith.empty() ? 0 : op.aloneWith.empty() ? op.operands.size() : 1;
   Json properties = {{"op", {{"const", op.name}}},
                      {"options",
                       {{"type", "object"},

@@ -71,6 +71,8 @@ std::string operandText(const Operator& op) {
   if (op.takesMore) text += ", …";
   for (std::size_t i = 0; i < op.aloneWith.size(); ++i)
     text += (i == 0 ? "; the first alone with --" : " or --") + op.aloneWith[i];
+  for (std::size_t i = 0; i < op.noneWith.size(); ++i)
+    text += (i == 0 ? "; none with --" : " or --") + op.noneWith[i];
   return text;
 }
 
@@ -130,6 +132,7 @@ std::string helpJson(const Operator& op) {
   }
   json["takes_more"] = op.takesMore;
   if (!op.aloneWith.empty()) json["alone_with"] = op.aloneWith;
+  if (!op.noneWith.empty()) json["none_with"] = op.noneWith;
   json["passes_through"] = op.flow == Flow::PassesThrough;
   json["parameters"] = nlohmann::ordered_json::array();
   for (const Param& param : op.params) {

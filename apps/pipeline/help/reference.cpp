@@ -58,7 +58,7 @@ std::string rangeOf(const Param& param) {
   for (const std::string& choice : param.choices) all.push_back(asCode(choice));
   if (param.type == ParamType::Velocity) all.push_back("three formulas, `@NAME`");
   if (takesDistance(param.type)) all.push_back("a number, a formula, `@NAME`");
-  if (param.type == ParamType::Mesh) all.push_back("`@NAME`");
+  if (param.type == ParamType::Mesh || param.type == ParamType::Solid) all.push_back("`@NAME`");
   if (param.allowsAuto) all.push_back("`auto`");
   if (param.range == Range::Positive) all.push_back("> 0");
   if (param.range == Range::NonNegative) all.push_back("≥ 0");

@@ -61,6 +61,8 @@ namespace pipeline {
 [[nodiscard]] Operator conversionOperator();
 [[nodiscard]] Operator transformOperator();
 [[nodiscard]] Operator clipOperator();
+[[nodiscard]] Operator latticeOperator();
+[[nodiscard]] Operator cageOperator();
 
 [[nodiscard]] Operator sceneOperator();
 

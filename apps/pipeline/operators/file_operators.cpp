@@ -1,12 +1,14 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <memory>
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/values/terrain_picture.h"
+#include "levelset/deform/lattice_file.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
@@ -23,6 +25,13 @@ namespace pipeline {
 namespace {
 
 using levelset::UsageError;
+
+/// Returns true for the name of a lattice file, and for a .json file that holds a lattice.
+bool isLattice(const Invocation& in, const std::string& name) {
+  if (!render::isSceneFormat(name)) return false;
+  return name.ends_with(".lattice.json") ||
+         (in.op().name == "read" && levelset::isLatticeFile(in.text("file")));
+}
 
 bool isStandardStream(const Invocation& in) {
   return in.text("file") == "-";
@@ -54,6 +63,7 @@ Kind fileKind(const Invocation& in) {
   if (levelset::isMeshFormat(name)) return isRead && readsPoints(in) ? Kind::Points : Kind::Mesh;
   if (levelset::isBandFormat(name)) return gridFileKind(in, name);
   if (mapping::isPatchFormat(name)) return Kind::Patch;
+  if (isLattice(in, name)) return Kind::Deformation;
   if (render::isSceneFormat(name)) return Kind::Scene;
   if (isRead && levelset::isVolumeFormat(name)) return Kind::Volume;
   if (isRead && levelset::holdsMolecule(name)) return Kind::Molecule;
@@ -105,6 +115,9 @@ Value read(Invocation& in) {
   if (kind == Kind::Points) return readCloud(in);
   if (kind == Kind::Patch)
     return Value(PatchValue{.patches = mapping::readPatches(file, in.maxMemory)});
+  if (kind == Kind::Deformation)
+    return Value(DeformationValue{
+        std::make_shared<levelset::LatticeDeformation>(levelset::readLattice(file, in.maxMemory))});
   if (kind == Kind::Volume) {
     levelset::ReadVolumeOptions options = volumeOptions(in);
     options.notes = &in.notes.notes;
@@ -243,7 +256,9 @@ void validateWrite(const Invocation& in) {
       held == Kind::Segmentation &&
       (levelset::holdsAttributes(formatName(in)) || levelset::isVdbFormat(formatName(in)));
   const bool isCloud = held == Kind::Points && levelset::holdsPoints(formatName(in));
-  if (held != kind && !isCloud && !isLabelled && !(held == Kind::Field && kind == Kind::Band)) {
+  const bool isLatticeFile = held == Kind::Deformation && kind == Kind::Scene;
+  if (held != kind && !isCloud && !isLabelled && !isLatticeFile &&
+      !(held == Kind::Field && kind == Kind::Band)) {
     throw UsageError(fmt::format(
         "write: {} cannot be written as '{}'; {}", kindPhrase(held), formatName(in),
         held == Kind::Band           ? "put 'mesh' before it, or write .vdb"
@@ -255,6 +270,7 @@ void validateWrite(const Invocation& in) {
         : held == Kind::Segmentation ? "write .vdb, .ply or .obj, or put 'extract LABEL' before it"
         : held == Kind::Molecule     ? "put 'molecule-surface' before it"
         : held == Kind::Terrain      ? "write .asc, or put 'mesh' before it"
+        : held == Kind::Deformation  ? "write .json"
         : held == Kind::Points       ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
         : kind == Kind::Points       ? "put 'sample' before it, or write .ply"
                                      : "put 'level-set' before it, or write .ply"));
@@ -267,7 +283,7 @@ void validateWrite(const Invocation& in) {
     throw UsageError(fmt::format(
         "write: --name is the name of a grid in a .vdb, and this file is a {}; leave it out",
         kindName(isCloud ? held : kind)));
-  if (kind == Kind::Scene && levelset::isStandardOutput(in.text("file")))
+  if (held == Kind::Scene && levelset::isStandardOutput(in.text("file")))
     throw UsageError(
         "write: a scene stores its level sets in files beside its own file, so it cannot go to "
         "standard output; give a file");
@@ -282,6 +298,12 @@ Value write(Invocation& in) {
           "write: this patch has --height auto, and its height is unknown without a texture; give "
           "--height a length");
     mapping::writePatches(file, value.patch().patches);
+  } else if (value.kind() == Kind::Deformation) {
+    const levelset::ControlLattice* lattice = value.deformation().lattice();
+    if (!lattice)
+      throw UsageError(
+          "write: a cage has no file of its own; write its two meshes before 'cage' joins them");
+    levelset::writeLattice(file, *lattice);
   } else if (value.kind() == Kind::Scene) {
     render::writeScene(file, value.scene(), in.progress);
   } else if (value.kind() == Kind::Terrain) {
@@ -343,8 +365,7 @@ Operator readOperator() {
       .group = "Files",
       .summary =
           "read a mesh, level set, field, segmentation, volume, point cloud, patches, scene, "
-          "molecule "
-          "or terrain",
+          "molecule, terrain or lattice",
       .details =
           "Meshes are ply, obj, stl or off, also with .gz. Level sets, fields and segmentations "
           "are "
@@ -362,7 +383,8 @@ Operator readOperator() {
           "of "
           "points are read. Volumes keep their spacing and orientation; a .raw needs --size and "
           "--type. "
-          "The json file of a Bézier volume is a scene, too. "
+          "The json file of a Bézier volume is a scene, too. A json file of a lattice is a "
+          "deformation. "
           "A terrain has heights of a ground; those of a grey png are from 0 (black) to 1 (white). "
           "Transparent pixels are missing. "
           "Of a molecule, the first model is read, without water. Of alternate locations of an "
@@ -417,12 +439,14 @@ Operator writeOperator() {
       .name = "write",
       .group = "Files",
       .summary =
-          "write meshes, level sets, fields, points, patches, scenes, segmentations and terrains",
+          "write meshes, level sets, fields, points, patches, scenes, segmentations, terrains and "
+          "lattices",
       .details =
           "Meshes go to ply, obj, stl or off, also with .gz. Level sets and fields go to vdb or "
           "nvdb, "
           "and points to ply, obj, xyz, csv or pts, also with .gz, or to vdb. Patches go to patch, "
-          "scenes to json, and terrains to asc. Segmentations go to vdb, or to ply or obj with the "
+          "scenes and lattices to json, and terrains to asc. Segmentations go to vdb, or to ply or "
+          "obj with the "
           "labels on both sides of each face. "
           "Data is written to a temporary file in the same folder, which replaces an existing file "
           "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "
@@ -449,7 +473,8 @@ Operator writeOperator() {
                 "points get the name 'points'",
             .fallback = "surface"}},
       .operands = {{Kind::Mesh, Kind::Band, Kind::Field, Kind::Patch, Kind::Scene, Kind::Points,
-                    Kind::Adaptive, Kind::Segmentation, Kind::Molecule, Kind::Terrain}},
+                    Kind::Adaptive, Kind::Segmentation, Kind::Molecule, Kind::Terrain,
+                    Kind::Deformation}},
       .flow = Flow::PassesThrough,
       .run = write,
       .cost = costPerVoxel(50, 0, 20),

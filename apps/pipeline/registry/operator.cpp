@@ -55,6 +55,8 @@ const char* typeName(ParamType type) {
       return "speed";
     case ParamType::Mesh:
       return "mesh";
+    case ParamType::Solid:
+      return "level set";
   }
   return "";
 }
@@ -99,6 +101,7 @@ std::string valueForm(const Param& param) {
     case ParamType::Velocity:
       return fmt::format("{}|\"FX, FY, FZ\"|@NAME", fmt::join(param.choices, "|"));
     case ParamType::Mesh:
+    case ParamType::Solid:
       return "@NAME";
   }
   return "";
@@ -117,10 +120,10 @@ void checkRange(const Param& param, double number, const std::string& text,
 void checkField(const Param& param, const std::string& text, const std::string& where) {
   if (text == "@") throw UsageError(fmt::format("{}: a name must follow '@'", where));
   if (namesValue(param, text)) return;
-  if (param.type == ParamType::Mesh)
+  if (param.type == ParamType::Mesh || param.type == ParamType::Solid)
     throw UsageError(
-        fmt::format("{}: '{}' is not the name of a mesh; name one with --as NAME and write @NAME",
-                    where, text));
+        fmt::format("{}: '{}' is not the name of a {}; name one with --as NAME and write @NAME",
+                    where, text, typeName(param.type)));
   const auto& known = param.choices;
   if (std::find(known.begin(), known.end(), text) != known.end()) return;
   levelset::withContext(where, [&] {
@@ -141,7 +144,7 @@ bool takesDistance(ParamType type) {
 
 bool namesValue(const Param& param, const std::string& text) {
   return (takesDistance(param.type) || param.type == ParamType::Velocity ||
-          param.type == ParamType::Mesh) &&
+          param.type == ParamType::Mesh || param.type == ParamType::Solid) &&
          text.starts_with('@');
 }
 
@@ -206,13 +209,27 @@ void checkText(const Param& param, const std::string& text, const std::string& w
     case ParamType::Velocity:
     case ParamType::Speed:
     case ParamType::Mesh:
+    case ParamType::Solid:
       return checkField(param, text, where);
   }
 }
 
+namespace {
+
+bool hasAny(const std::map<std::string, std::string>& options,
+            const std::vector<std::string>& names) {
+  return std::any_of(names.begin(), names.end(),
+                     [&](const std::string& name) { return options.contains(name); });
+}
+
+}  // namespace
+
 bool Operator::isAlone(const std::map<std::string, std::string>& options) const {
-  return std::any_of(aloneWith.begin(), aloneWith.end(),
-                     [&](const std::string& option) { return options.contains(option); });
+  return hasAny(options, aloneWith);
+}
+
+bool Operator::takesNone(const std::map<std::string, std::string>& options) const {
+  return hasAny(options, noneWith);
 }
 
 const Param* Operator::find(const std::string& param) const {

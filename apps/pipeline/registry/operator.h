@@ -38,7 +38,8 @@ enum class ParamType {
   Velocity,  ///< a vector field that may depend on time: one of `choices`, three formulas, or the
              ///< @NAME of a field
   Speed,     ///< a normal speed: a formula in x, y, z, r, t, nx, ny, nz, k, or the @NAME of a value
-  Mesh       ///< the @NAME of a mesh
+  Mesh,      ///< the @NAME of a mesh
+  Solid      ///< the @NAME of a level set
 };
 
 using Range = levelset::OptionRange;
@@ -99,6 +100,8 @@ struct Operator {
   bool operandsOptional = false;  ///< may run without any operand (`info FILE`)
   /// Options with which the action takes its first operand alone.
   std::vector<std::string> aloneWith = {};
+  /// Options with which the action takes no operand.
+  std::vector<std::string> noneWith = {};
   bool readsNames = false;  ///< the result depends on the names that --as gave to the operands
   /// Returns false if --voxel does not apply to the options and operands, although the action has
   /// it. Empty: it applies.
@@ -147,9 +150,11 @@ struct Operator {
   [[nodiscard]] const Param* find(const std::string& param) const;
   /// Returns true if an option of `aloneWith` is given. @param options  values by name
   [[nodiscard]] bool isAlone(const std::map<std::string, std::string>& options) const;
+  /// Returns true if an option of `noneWith` is given. @param options  values by name
+  [[nodiscard]] bool takesNone(const std::map<std::string, std::string>& options) const;
   /// Number of operands that the action takes without takesMore and operandsOptional.
   [[nodiscard]] std::size_t operandCount(const std::map<std::string, std::string>& options) const {
-    return isAlone(options) ? 1 : operands.size();
+    return takesNone(options) ? 0 : isAlone(options) ? 1 : operands.size();
   }
 };
 

@@ -61,6 +61,8 @@ const char* reasonAgainst(Kind kind) {
       return "a volume has no thumbnail";
     case Kind::Points:
       return "a point cloud has no thumbnail";
+    case Kind::Deformation:
+      return "a deformation has no thumbnail";
     default:
       return nullptr;
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "levelset/adaptive/adaptive_to_mesh.h"
+#include "levelset/deform/cage/cage.h"
 #include "levelset/error.h"
 #include "levelset/geometry/vertex_normals.h"
 #include "levelset/segmented/meshing/segmented_to_mesh.h"
@@ -46,6 +47,8 @@ const char* kindName(Kind kind) {
       return "molecule";
     case Kind::Terrain:
       return "terrain";
+    case Kind::Deformation:
+      return "deformation";
   }
   return "";
 }
@@ -121,6 +124,7 @@ Value::Value(levelset::Molecule molecule)
     : data_(std::make_shared<const levelset::Molecule>(std::move(molecule))) {}
 Value::Value(levelset::HeightField terrain)
     : data_(std::make_shared<const levelset::HeightField>(std::move(terrain))) {}
+Value::Value(DeformationValue deformation) : data_(std::move(deformation)) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
 Kind Value::kind() const {
@@ -147,6 +151,8 @@ Kind Value::kind() const {
       return Kind::Molecule;
     case 11:
       return Kind::Terrain;
+    case 12:
+      return Kind::Deformation;
     default:
       return plan_->kind;
   }
@@ -200,6 +206,20 @@ const levelset::Molecule& Value::molecule() const {
 
 const levelset::HeightField& Value::terrain() const {
   return *as<std::shared_ptr<const levelset::HeightField>>(Kind::Terrain);
+}
+
+const DeformationValue& Value::deformation() const {
+  return as<DeformationValue>(Kind::Deformation);
+}
+
+const levelset::ControlLattice* DeformationValue::lattice() const {
+  const auto* lattice = dynamic_cast<const levelset::LatticeDeformation*>(map.get());
+  return lattice ? &lattice->lattice() : nullptr;
+}
+
+std::size_t DeformationValue::controlPoints() const {
+  if (const levelset::ControlLattice* of = lattice()) return of->data().points.size();
+  return dynamic_cast<const levelset::CageDeformation&>(*map).rest().size();
 }
 
 const Plan& Value::plan() const {
@@ -259,6 +279,9 @@ const Plan& Value::plan() const {
       plan.bounds = terrain().bounds();
       plan.fieldBytes = static_cast<double>(terrain().memoryUse());
       plan.samples = {terrain().columns, terrain().rows};
+      break;
+    case Kind::Deformation:
+      plan.bounds = deformation().map->bounds();
       break;
     case Kind::Scene:
       plan.bounds = scene().scene.bounds();

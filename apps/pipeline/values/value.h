@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "levelset/adaptive/adaptive_field.h"
+#include "levelset/deform/deformation.h"
 #include "levelset/fields/grid.h"
 #include "levelset/mesh.h"
 #include "levelset/molecules/molecule.h"
@@ -38,7 +39,8 @@ enum class Kind {
   Adaptive,      ///< a solid as distances on an octree
   Segmentation,  ///< a partition of space into regions with labels
   Molecule,      ///< atoms in residues and chains
-  Terrain        ///< heights of a ground on a regular grid
+  Terrain,       ///< heights of a ground on a regular grid
+  Deformation    ///< a map of space: a lattice of control points, or a cage
 };
 [[nodiscard]] const char* kindName(Kind kind);
 /// Returns the name with its article: "a mesh", "an adaptive field".
@@ -109,6 +111,18 @@ struct PatchValue {
   std::shared_ptr<const PatchRecipe> recipe = {};  ///< null for patches from files
 };
 
+/// A map of space that moves solids, meshes, points and patches.
+struct DeformationValue {
+  std::shared_ptr<const levelset::Deformation> map;  ///< not null
+  /// Largest distance of a ready lattice from its closed form, world units; 0 for others.
+  double error = 0;
+
+  /// Returns the lattice, or null for a cage.
+  [[nodiscard]] const levelset::ControlLattice* lattice() const;
+  /// Number of control points of a lattice, or of vertices of a cage.
+  [[nodiscard]] std::size_t controlPoints() const;
+};
+
 /// A value of a chain: immutable and cheap to copy. In a dry run it contains only a plan.
 class Value {
  public:
@@ -123,6 +137,7 @@ class Value {
   explicit Value(levelset::SegmentedField field);
   explicit Value(levelset::Molecule molecule);
   explicit Value(levelset::HeightField terrain);
+  explicit Value(DeformationValue deformation);
   explicit Value(Plan plan);
 
   [[nodiscard]] Kind kind() const;
@@ -140,6 +155,7 @@ class Value {
   [[nodiscard]] const levelset::SegmentedField& segmentation() const;
   [[nodiscard]] const levelset::Molecule& molecule() const;
   [[nodiscard]] const levelset::HeightField& terrain() const;
+  [[nodiscard]] const DeformationValue& deformation() const;
 
   /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
   /// it from the value on the first call.
@@ -158,7 +174,7 @@ class Value {
                std::shared_ptr<const render::ViewedScene>, std::shared_ptr<const levelset::Volume>,
                std::shared_ptr<const levelset::PointCloud>, levelset::AdaptiveField,
                levelset::SegmentedField, std::shared_ptr<const levelset::Molecule>,
-               std::shared_ptr<const levelset::HeightField>>
+               std::shared_ptr<const levelset::HeightField>, DeformationValue>
       data_;
   mutable std::optional<Plan> plan_;
 };

@@ -25,6 +25,7 @@ from ._values import (
     AdaptiveField,
     Field,
     Mesh,
+    Deformation,
     Molecule,
     Patch,
     PointCloud,
@@ -52,7 +53,7 @@ _operators.install(globals())
 
 __all__ = [
     "Cancelled", "Error", "FileError", "InputError", "NumericalError", "ResourceError", "UsageError",
-    "AdaptiveField", "Field", "Mesh", "Molecule", "Patch", "PointCloud", "Scan", "Scene", "Segmentation", "Solid",
+    "AdaptiveField", "Deformation", "Field", "Mesh", "Molecule", "Patch", "PointCloud", "Scan", "Scene", "Segmentation", "Solid",
     "Surface", "Terrain", "Value", "Volume", "Warning",
     "compute", "graph", "last_report", "map", "set_cache", "set_max_memory", "set_threads",
     "from_array", "from_function",

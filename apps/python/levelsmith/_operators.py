@@ -49,7 +49,8 @@ def signature_of(operator):
     Parameter = inspect.Parameter
     params = []
     for number, name in enumerate(operand_names(operator)):
-        is_optional = operator["operands_optional"] or (number > 0 and operator["first_alone"])
+        is_optional = operator["operands_optional"] or operator["may_take_none"]
+        is_optional = is_optional or (number > 0 and operator["first_alone"])
         default = None if is_optional else Parameter.empty
         params.append(Parameter(name, Parameter.POSITIONAL_ONLY, default=default))
     if operator["takes_more"]:

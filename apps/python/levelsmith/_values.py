@@ -465,10 +465,30 @@ class Terrain(Value):
         return self._known().terrain_place()[1]
 
 
+class Deformation(Value):
+    """A map of space: a lattice of control points, or a cage. `lattice`, `cage` and `read` make one.
+
+    `Deformation(points, box, degree=0)` is a lattice. points is an array of (l, m, n, 3) floats, box two corners,
+    and degree one number or three; 0: 3, or less with fewer than 4 points.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, points, box, degree=0):
+        low, high = numpy.asarray(box, dtype=float)
+        degrees = numpy.broadcast_to(numpy.asarray(degree), 3)
+        self._node = _core.lattice(numpy.asarray(points), tuple(low), tuple(high), [int(d) for d in degrees])
+
+    @property
+    def points(self):
+        """Control points, (l, m, n, 3) float64, read-only, no copy; None for a cage. Computes the value."""
+        return self._known().lattice_array()
+
+
 classes = {
     c.__name__: c
     for c in (
         Solid, Surface, Mesh, Patch, Field, Scene, Scan, PointCloud, AdaptiveField, Segmentation,
-        Molecule, Terrain,
+        Molecule, Terrain, Deformation,
     )  # fmt: skip
 }

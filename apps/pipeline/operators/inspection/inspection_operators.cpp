@@ -9,6 +9,7 @@
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/json_output.h"
 #include "apps/pipeline/operators/solids/adaptive_actions.h"
+#include "apps/pipeline/operators/solids/deformation_options.h"
 #include "apps/pipeline/operators/solids/segment_actions.h"
 #include "apps/pipeline/operators/terrain/terrain_figures.h"
 #include "apps/pipeline/operators/volume_params.h"
@@ -355,6 +356,8 @@ Json valueInfo(const Value& value, Invocation& in) {
     json["active_voxels"] = field.activeVoxelCount();
     json["bytes"] = field.memoryUse();
     json["hash"] = fmt::format("{:016x}", field.contentHash());
+  } else if (value.kind() == Kind::Deformation) {
+    addDeformation(json, value.deformation());
   } else if (value.kind() == Kind::Molecule) {
     addMolecule(json, value.molecule());
   } else if (value.kind() == Kind::Terrain) {
@@ -571,7 +574,7 @@ Operator infoOperator() {
            jsonParam()},
       .operands = {{Kind::Band, Kind::Mesh, Kind::Patch, Kind::Field, Kind::Surface, Kind::Scene,
                     Kind::Volume, Kind::Points, Kind::Adaptive, Kind::Segmentation, Kind::Molecule,
-                    Kind::Terrain}},
+                    Kind::Terrain, Kind::Deformation}},
       .operandsOptional = true,
       .flow = Flow::PassesThrough,
       .run = info,

@@ -161,6 +161,7 @@ TEST_F(DeformAction, RefusesFoldsAndOptionsThatExcludeEachOther) {
   expectRefusal(ball + "deform --bend 170", 3, "folds");
   expectRefusal("box --size 0.5,0.5,10 --voxel 0.1 ! deform --bend 400", 3, "overlaps itself");
   expectRefusal(ball + "deform", 2, "--bend, --twist, --taper, --stretch, --lattice or --cage");
+  expectRefusal(ball + "deform", 2, "needs 2 operands but has 1");
   expectRefusal(ball + "deform --bend 10 --twist 10", 2, "exclude each other");
   expectRefusal(ball + "deform --twist 10 --towards 1,0,0", 2, "--towards is for --bend");
   expectRefusal(ball + "deform --bend 10 --towards 0,0,1", 2, "parallel to the axis");
@@ -169,6 +170,126 @@ TEST_F(DeformAction, RefusesFoldsAndOptionsThatExcludeEachOther) {
   expectRefusal(ball + "deform --twist 10 --tolerance 0.1", 2, "--tolerance is for meshes");
   expectRefusal(ball + "mesh ! deform --twist 10 --voxel 0.1", 2, "--voxel is for level sets");
   expectRefusal(ball + "deform --lattice a.json --axis 1,0,0", 2, "--axis does not apply");
+}
+
+// === Deformations as values
+
+TEST_F(DeformAction, ALatticeIsAValue) {
+  const std::string lattice = "lattice --bend 80 --towards 1,0,0 --box '-1,-1,-2.2 1,1,2.2' --as l";
+  // The same bits as by the file of the lattice, for each kind of operand.
+  const Json written = json(lattice + " ! write bent.lattice.json ! info --json");
+  EXPECT_EQ(written["kind"], "deformation");
+  EXPECT_EQ(written["form"], "lattice");
+  EXPECT_FALSE(written["identity"].get<bool>());
+  EXPECT_NEAR(written["origin"][2].get<double>(), -2.2, 1e-8);
+  for (const std::string operand : {"", "mesh ! ", "mesh ! sample --spacing 0.3 ! "}) {
+    const std::string chain = std::string(kCapsule) + operand;
+    const Json byFile = json(chain + "deform --lattice bent.lattice.json ! info --json"),
+               byValue = json(lattice + " ! " + chain + "deform @l ! info --json"),
+               byStack = json(chain + "read bent.lattice.json ! deform ! info --json");
+    EXPECT_EQ(byFile, byValue);
+    EXPECT_EQ(byFile, byStack);
+  }
+  // One lattice moves several operands.
+  const Json both = json(lattice + " ! " + kCapsule +
+                         "deform @l --as a ! sphere --radius 0.4 --voxel 0.1 ! deform @l --as b ! "
+                         "union @a @b ! measure --json");
+  EXPECT_NEAR(both["volume"].get<double>() / kVolume, 1, 1e-2);
+}
+
+TEST_F(DeformAction, ALatticeAroundAnOperandIsThatOfDeform) {
+  const std::string bar = "box --size 1,1,4 --voxel 0.1 --as bar ! ";
+  EXPECT_EQ(json(bar + "lattice --twist 50 --as l ! deform @bar @l ! info --json"),
+            json(bar + "deform --twist 50 ! info --json"));
+  EXPECT_EQ(json(bar + "mesh --as m ! lattice @m --taper 0.5 --as l ! deform @m @l ! info --json"),
+            json(bar + "mesh ! deform --taper 0.5 ! info --json"));
+}
+
+TEST_F(DeformAction, ALatticeOfCountsMovesNothing) {
+  const std::string ball = "sphere --radius 1 --voxel 0.1 --as ball ! ";
+  const Json made =
+      json(ball + "lattice --count 4,5,6 --degree 3,2,5 ! write rest.json ! info --json");
+  EXPECT_EQ(made["count"], Json({4, 5, 6}));
+  EXPECT_EQ(made["degree"], Json({3, 2, 5}));
+  EXPECT_TRUE(made["identity"].get<bool>());
+  EXPECT_EQ(json(ball + "read rest.json --as l ! deform @ball @l ! info --json"),
+            json(ball + "info --json"));
+  EXPECT_EQ(json("lattice --count 2 --box '0,0,0 1,1,1' ! info --json")["degree"], Json({1, 1, 1}));
+}
+
+TEST_F(DeformAction, ACageIsAValue) {
+  const std::string cage =
+      "box --size 6.5,6.5,6.5 --voxel 2 ! mesh --as rest ! deform --stretch 1.5 --tolerance 0 --as "
+      "moved "
+      "! write moved.ply ! cage @rest @moved --as c ! ";
+  EXPECT_EQ(json(cage + "info --json")["form"], "cage");
+  const std::string ball = "sphere --radius 1 --voxel 0.2 ! mesh ! ";
+  const Json moved = json(cage + ball + "deform @c ! measure --json");
+  EXPECT_NEAR(moved["bounds"]["max"][2].get<double>(), 1.5, 0.01);
+  EXPECT_NEAR(moved["bounds"]["max"][0].get<double>(), 1, 0.01);
+  expectRefusal(cage + "write c.json", 2, "has no file of its own");
+}
+
+TEST_F(DeformAction, UntanglesValues) {
+  const std::string lattice = "lattice --bend 170 --box '-1.2,-1.2,-1.2 1.2,1.2,1.2' ";
+  const std::string ball = "! sphere --radius 1 --voxel 0.2 ! ";
+  EXPECT_EQ(levelsmith(lattice + "--as l " + ball + "mesh ! deform @l --untangle ! measure").code,
+            0);
+  EXPECT_EQ(levelsmith(lattice + "--untangle --as l " + ball + "mesh ! deform @l ! info").code, 0);
+}
+
+TEST_F(DeformAction, RefusesWrongValues) {
+  const std::string lattice = "lattice --twist 9 --box '-2,-2,-2 2,2,2' --as l ! ";
+  const std::string ball = "sphere --radius 1 --voxel 0.1 ! ";
+  expectRefusal(lattice + ball + "deform @l --twist 10", 2, "operand 1 is a deformation");
+  expectRefusal(ball + "lattice --twist 9 --as l ! deform @l @l --twist 9", 2, "takes 1 operand");
+  expectRefusal(lattice + ball + "deform @l --axis 1,0,0", 2, "given as a value");
+  expectRefusal(lattice + "mesh @l", 2, "a deformation");
+  expectRefusal(lattice + "measure @l", 2, "'deform' moves other values by it");
+  expectRefusal(lattice + "write l.vdb", 2, "write .json");
+  expectRefusal("sphere --radius 3 --voxel 0.2 --as b ! " + lattice + "deform @b @l", 3,
+                "outside the box of the lattice");
+  expectRefusal(ball + "mesh ! deform @l", 2, "no result is named");
+  expectRefusal("lattice --twist 9", 2, "needs 1 operand but has 0");
+  expectRefusal("lattice --twist 9", 2, "or give --box");
+  expectRefusal(ball + "lattice", 2, "--bend, --twist, --taper, --stretch or --count");
+  expectRefusal(ball + "lattice --twist 9 --degree 3", 2, "--degree is for --count");
+  expectRefusal(ball + "lattice --count 3 --degree 3", 3, "degree");
+  expectRefusal(ball + "lattice --count 2.5", 2, "not an integer");
+  expectRefusal(ball + "lattice --count 1000", 4, "control points");
+  expectRefusal(ball + "lattice --count 4 --degree 21", 2, "from 1 to 20");
+  expectRefusal("read none.lattice.json ! info", 6, "none.lattice.json");
+}
+
+/// A patch with a texture above a capsule, and the deformed capsule below the deformed patch.
+TEST_F(DeformAction, MovesPatches) {
+  const std::string patch =
+      std::string(kCapsule) +
+      "patch --at 0.5,0,0 --size 0.4,0.6 --height 0.2 --layers 3 --as tile ! write tile.patch ! ";
+  const Json before = json(patch + "info --json");
+  const Json after = json(patch +
+                          "lattice --twist 40 --box '-1,-1,-2 1,1,2' --as l ! deform "
+                          "@tile @l ! write moved.patch ! info --json");
+  EXPECT_EQ(before["kind"], "patch");
+  EXPECT_EQ(after["kind"], "patch");
+  EXPECT_NE(before["bounds"], after["bounds"]);
+  const std::string values = patch +
+                             "lattice --bend 50 --towards 1,0,0 --box '-1,-1,-2.2 1,1,2.2' "
+                             "--as l ! " +
+                             kCapsule + "deform @l --as base ! ";
+  const support::Outcome snapped =
+      levelsmith("--report report.json " + values + "deform @tile @l --onto @base ! write b.patch");
+  ASSERT_EQ(snapped.code, 0) << snapped.err;
+  const Json details = reportedDetails();
+  EXPECT_GT(details["largest_snap"].get<double>(), 0);
+  EXPECT_LT(details["largest_snap"].get<double>(), 2e-4);
+  expectRefusal(patch +
+                    "lattice --bend 50 --box '-1,-1,-2.2 1,1,2.2' --as l ! sphere --radius 1 "
+                    "--voxel 0.1 --as other ! deform @tile @l --onto @other ! info",
+                3, "further than a voxel");
+  expectRefusal(std::string(kCapsule) + "deform --twist 9 --onto @x", 2, "no result is named '@x'");
+  expectRefusal("sphere --radius 1 --voxel 0.1 --as c ! deform @c --twist 9 --onto @c", 2,
+                "--onto is for patches");
 }
 
 }  // namespace deform_action_test
