@@ -72,7 +72,7 @@ struct Hit {
   [[nodiscard]] double beyond() const { return distance + 2 * surfaceError; }
 };
 
-/// Hit on a surface that is given exactly, as a Bézier volume or a quadric. It is opaque. The facet
+/// Hit on a surface that is given exactly, as a Bézier volume or a terrain. It is opaque. The facet
 /// has the surface's normal. @param diagonal  of the box of the surface, world units
 [[nodiscard]] inline Hit exactHit(const Imath::V3d& position, double distance,
                                   const Imath::V3d& normal, double diagonal,

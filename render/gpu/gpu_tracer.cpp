@@ -19,6 +19,7 @@
 #include "render/gpu/gpu_light.h"
 #include "render/gpu/nano_grid.h"
 #include "render/gpu/quadrics/gpu_quadrics.h"
+#include "render/gpu/terrain/gpu_terrains.h"
 #include "render/kernel/trace_glsl.h"
 
 namespace render {
@@ -244,6 +245,7 @@ struct GpuTracer::Impl {
   GpuInterfaces interfaces;
   GpuBeziers beziers;
   GpuQuadrics quadrics;
+  GpuTerrains terrains;
   double shaderSeconds = 0;
 
   Impl(const GlContext& context_, std::size_t largestTable_)
@@ -253,7 +255,8 @@ struct GpuTracer::Impl {
         light(context_, largestTable),
         interfaces(context_, largestTable),
         beziers(context_),
-        quadrics(context_, largestTable) {
+        quadrics(context_, largestTable),
+        terrains(context_, largestTable) {
     shift = static_cast<int>(std::bit_width(largestTable / sizeof(float))) - 1;
     shift = std::min(shift, 30);  // indices of values fit into a signed 32-bit integer
   }
@@ -270,6 +273,7 @@ struct GpuTracer::Impl {
     interfaces.release();
     beziers.release();
     quadrics.release();
+    terrains.release();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -510,6 +514,11 @@ SharedTree::Roots GpuTracer::bezierRoots(const SharedTree& tree,
 std::vector<QuadricHit> GpuTracer::quadricHits(const QuadricCaster& caster,
                                                const std::vector<Camera::Ray>& rays) const {
   return impl_->quadrics.firstHits(caster, rays);
+}
+
+std::vector<TerrainHit> GpuTracer::terrainHits(const TerrainCaster& caster,
+                                               const std::vector<Camera::Ray>& rays) const {
+  return impl_->terrains.firstHits(caster, rays);
 }
 
 GpuBezierCounts GpuTracer::bezierCounts() const {

@@ -50,6 +50,9 @@ class GpuTracer : public KernelTracer {
   /// @throws levelset::ResourceLimit for the reasons of GpuQuadrics::firstHits()
   [[nodiscard]] std::vector<QuadricHit> quadricHits(
       const QuadricCaster& caster, const std::vector<Camera::Ray>& rays) const override;
+  /// @throws levelset::ResourceLimit for the reasons of GpuTerrains::firstHits()
+  [[nodiscard]] std::vector<TerrainHit> terrainHits(
+      const TerrainCaster& caster, const std::vector<Camera::Ray>& rays) const override;
 
   /// Work of all calls of bezierRoots() so far.
   [[nodiscard]] GpuBezierCounts bezierCounts() const;

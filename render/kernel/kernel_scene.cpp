@@ -68,6 +68,11 @@ std::vector<QuadricHit> KernelTracer::quadricHits(const QuadricCaster& caster,
   return caster.firstHits(rays);
 }
 
+std::vector<TerrainHit> KernelTracer::terrainHits(const TerrainCaster& caster,
+                                                  const std::vector<Camera::Ray>& rays) const {
+  return caster.firstHits(rays);
+}
+
 std::vector<InterfaceHit> KernelTracer::interfaceHits(const InterfaceCaster& caster,
                                                       const std::vector<InterfaceRay>& rays,
                                                       bool wantsNormals) const {
@@ -85,7 +90,8 @@ KernelScene::KernelScene(const Scene& scene, std::size_t maxBytes, Filter filter
       mapped_(scene),
       segmented_(scene.segmented),
       beziers_(scene.beziers),
-      quadrics_(scene.quadrics) {
+      quadrics_(scene.quadrics),
+      terrains_(scene.terrains) {
   makeTables(scene, {.filter = filter, .maxBytes = maxBytes}, false);
 }
 
@@ -94,7 +100,8 @@ KernelScene::KernelScene(const Scene& scene, const RenderOptions& options)
       mapped_(scene),
       segmented_(scene.segmented),
       beziers_(scene.beziers),
-      quadrics_(scene.quadrics) {
+      quadrics_(scene.quadrics),
+      terrains_(scene.terrains) {
   makeTables(scene, options, true);
 }
 
@@ -127,9 +134,9 @@ void KernelScene::makeTables(const Scene& scene, const RenderOptions& options, b
       kCopies;
   levelset::requireMemory(leaves * kBytesOfBlock, options.maxBytes);
   // Culling knows how far light rays start from solids and meshes, but not from mapped textures,
-  // Bézier volumes and quadrics. Mirrors show what is outside the frame.
+  // Bézier volumes, quadrics and terrains. Mirrors show what is outside the frame.
   const bool isKnown = !box.isEmpty() && mapped_.isEmpty() && beziers_.empty() &&
-                       quadrics_.empty() && !options.optics.isActive();
+                       quadrics_.empty() && terrains_.empty() && !options.optics.isActive();
   const FrustumCulling culling =
       isPicture && isKnown ? FrustumCulling(scene, options, box) : FrustumCulling();
   for (std::size_t i = 0; i < scene.solids.size(); ++i) {
@@ -194,6 +201,7 @@ void KernelScene::updateView(const Scene& scene) {
   if (segmented_) bounds_.extendBy(segmented_->caster.bounds());
   for (const BezierPart& part : beziers_) bounds_.extendBy(part.caster.bounds());
   for (const QuadricPart& part : quadrics_) bounds_.extendBy(part.caster.bounds());
+  for (const TerrainPart& part : terrains_) bounds_.extendBy(part.caster.bounds());
   trees_.clear();
   // An operand is crossed beyond the end of the view, too: its last crossing shows if the ray is
   // inside it.
@@ -227,6 +235,7 @@ std::size_t KernelScene::bytes() const {
   if (segmented_) sum += segmented_->caster.field().memoryUse() + segmented_->caster.bytes();
   for (const BezierPart& part : beziers_) sum += part.caster.bytes();
   for (const QuadricPart& part : quadrics_) sum += part.caster.bytes();
+  for (const TerrainPart& part : terrains_) sum += part.caster.bytes();
   for (const auto& tree : trees_) sum += tree->counts().peakBytes;
   return sum + mapped_.bytes();
 }
@@ -277,6 +286,19 @@ std::vector<Hit> KernelScene::castQuadrics(const KernelTracer& tracer,
                                 caster.colourOf(found[i]), bezierSolid_ + beziers_.size() + part);
       hits[i].primitive = found[i].slot;
     }
+  }
+  return hits;
+}
+
+std::vector<Hit> KernelScene::castTerrains(const KernelTracer& tracer,
+                                           const std::vector<Camera::Ray>& rays) const {
+  std::vector<Hit> hits(terrains_.empty() ? 0 : rays.size());
+  const std::size_t first = bezierSolid_ + beziers_.size() + quadrics_.size();
+  for (std::size_t part = 0; part < terrains_.size(); ++part) {
+    const std::vector<TerrainHit> found = tracer.terrainHits(terrains_[part].caster, rays);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      if (found[i].found && (!hits[i].found || found[i].distance < hits[i].distance))
+        hits[i] = terrains_[part].hitOf(rays[i], found[i], first + part);
   }
   return hits;
 }

@@ -76,6 +76,9 @@ class KernelTracer : public FieldTracer {
   /// First hits of rays of the camera with quadrics. The default casts on the calling thread.
   [[nodiscard]] virtual std::vector<QuadricHit> quadricHits(
       const QuadricCaster& caster, const std::vector<Camera::Ray>& rays) const;
+  /// First hits of rays with a terrain. The default casts on the calling thread.
+  [[nodiscard]] virtual std::vector<TerrainHit> terrainHits(
+      const TerrainCaster& caster, const std::vector<Camera::Ray>& rays) const;
 };
 
 /// Hits of the rays through a block of pixels with solids, at most one for each ray.
@@ -143,12 +146,13 @@ class KernelScene {
 
   [[nodiscard]] const std::vector<KernelSolid>& solids() const { return solids_; }
   /// World-space box of the meshes, the shells of mapped textures, the Bézier volumes, the
-  /// quadrics, the interfaces of a segmented field and the grid cells that the solids' surfaces
-  /// cross; empty when there are none. For a blended scene: Scene::bounds(). If a volume has no
-  /// surface and nothing else is drawn: Scene::volumeBounds().
+  /// quadrics, the terrains, the interfaces of a segmented field and the grid cells that the
+  /// solids' surfaces cross; empty when there are none. For a blended scene: Scene::bounds(). If a
+  /// volume has no surface and nothing else is drawn: Scene::volumeBounds().
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }
   /// World-space box of the meshes, the shells of mapped textures, the Bézier volumes, the
-  /// quadrics, the interfaces of a segmented field and the blocks that the solids' surfaces cross.
+  /// quadrics, the terrains, the interfaces of a segmented field and the blocks that the solids'
+  /// surfaces cross.
   /// For a blended scene: Scene::bounds(). Its size determines the absolute error of
   /// single-precision positions.
   [[nodiscard]] const Imath::Box3d& tableBounds() const { return tableBounds_; }
@@ -180,6 +184,11 @@ class KernelScene {
   [[nodiscard]] const std::vector<QuadricPart>& quadrics() const { return quadrics_; }
   /// First hits of rays of the camera with the quadrics; empty without any.
   [[nodiscard]] std::vector<Hit> castQuadrics(const KernelTracer& tracer,
+                                              const std::vector<Camera::Ray>& rays) const;
+  /// Terrains of the scene.
+  [[nodiscard]] const std::vector<TerrainPart>& terrains() const { return terrains_; }
+  /// First hits of rays with the terrains; empty without any.
+  [[nodiscard]] std::vector<Hit> castTerrains(const KernelTracer& tracer,
                                               const std::vector<Camera::Ray>& rays) const;
   [[nodiscard]] std::size_t bytes() const;
   /// Numbers of blocks of all solids, by their use in the brick tables.
@@ -284,6 +293,7 @@ class KernelScene {
   std::vector<std::size_t> operands_;  // indices in beziers_ of those that the expression names
   Camera camera_;
   std::vector<QuadricPart> quadrics_;
+  std::vector<TerrainPart> terrains_;
   std::optional<FieldTraversal> fields_;
   Imath::Box3d bounds_, tableBounds_;
   double near_ = 0, far_ = Camera::kNoDepth;  // visible depth range of the camera, world units

@@ -172,6 +172,7 @@ KernelPainter::FirstHits KernelPainter::firstHits(const KernelTracer& tracer,
       ofCamera ? surfaces_.castBeziers(tracer, rays, &counts) : surfaces_.castBeziersOf(rays);
   if (counts.overruns > 0) layers_.overruns += counts.overruns;
   first.onQuadrics = surfaces_.castQuadrics(tracer, rays);
+  first.onTerrains = surfaces_.castTerrains(tracer, rays);
   return first;
 }
 
@@ -199,7 +200,8 @@ Hit KernelPainter::nearestOf(const Camera::Ray& ray, double meshNear, const Hit&
         surfaces_.mapped().intersect(ray.origin, ray.direction, ray.near, farthest());
     if (onTexture.found) nearest = onTexture;
   }
-  for (const std::vector<Hit>* others : {&first.onInterfaces, &first.onQuadrics}) {
+  for (const std::vector<Hit>* others :
+       {&first.onInterfaces, &first.onQuadrics, &first.onTerrains}) {
     if (others->empty()) continue;
     const Hit& other = (*others)[i];
     if (other.found && (!nearest.found || other.distance < nearest.distance)) nearest = other;
@@ -563,6 +565,12 @@ Image paintPicture(const Scene& scene, const KernelScene& surfaces, const Kernel
     for (const QuadricPart& part : surfaces.quadrics()) count += part.caster.count();
     image.attributes["ls:read"] =
         fmt::format("{} quadrics, {:.1f} MB", count, static_cast<double>(surfaces.bytes()) * 1e-6);
+  } else if (!surfaces.terrains().empty() && surfaces.solids().empty()) {
+    double samples = 0;
+    for (const TerrainPart& part : surfaces.terrains())
+      samples += static_cast<double>(part.caster.field().heights.size());
+    image.attributes["ls:read"] = fmt::format("terrain of {:.0f} samples, {:.1f} MB", samples,
+                                              static_cast<double>(surfaces.bytes()) * 1e-6);
   } else if (!surfaces.beziers().empty() && surfaces.solids().empty()) {
     std::size_t parts = 0;
     for (const BezierPart& part : surfaces.beziers()) parts += part.caster.partCount();

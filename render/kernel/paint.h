@@ -33,10 +33,10 @@ class KernelPainter {
   /// traced together.
   [[nodiscard]] static std::vector<Pixel> pixelsOf(const PixelBox& box);
   [[nodiscard]] std::size_t numberOf(const Pixel& pixel) const;
-  /// First hits of rays with the surface of a blended scene, with a segmented field and with
-  /// quadrics, and all visible ones with Bézier volumes; empty for scenes without.
+  /// First hits of rays with the surface of a blended scene, with a segmented field, with quadrics
+  /// and with terrains, and all visible ones with Bézier volumes; empty for scenes without.
   struct FirstHits {
-    std::vector<Hit> onFields, onInterfaces, onQuadrics;
+    std::vector<Hit> onFields, onInterfaces, onQuadrics, onTerrains;
     BezierHits onBeziers;
   };
   /// KernelScene::castPixels(), with the counts of Bézier operands in the layers.

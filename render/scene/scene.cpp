@@ -74,6 +74,7 @@ Imath::Box3d Scene::bounds() const {
   for (std::size_t n = 0; n < beziers.size(); ++n)
     if (!isOperand(n)) all.extendBy(beziers[n].caster.bounds());
   for (const QuadricPart& part : quadrics) all.extendBy(part.caster.bounds());
+  for (const TerrainPart& part : terrains) all.extendBy(part.caster.bounds());
   return all;
 }
 
@@ -109,6 +110,7 @@ std::vector<double> Scene::extents(const std::vector<Imath::V3d>& directions) co
   for (std::size_t n = 0; n < beziers.size(); ++n)
     if (!isOperand(n)) extend(ofSolids, beziers[n].caster.extents(directions));
   for (const QuadricPart& part : quadrics) extend(ofSolids, part.caster.extents(directions));
+  for (const TerrainPart& part : terrains) extend(ofSolids, part.caster.extents(directions));
   return ofSolids;
 }
 

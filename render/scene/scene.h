@@ -20,6 +20,7 @@
 #include "render/scene/csg_expression.h"
 #include "render/scene/mapped_texture.h"
 #include "render/segmented/segmented_part.h"
+#include "render/terrain/rays/terrain_part.h"
 #include "render/volumes/volume_surface.h"
 
 namespace render {
@@ -115,6 +116,8 @@ struct Scene {
   std::vector<BezierPart> beziers = {};
   /// Drawn beside the solids. Not in a blended scene.
   std::vector<QuadricPart> quadrics = {};
+  /// Drawn beside the solids. Not in a blended scene.
+  std::vector<TerrainPart> terrains = {};
   /// True when the scene is drawn as the zero set of one function of all solids' fields: a soft
   /// expression or a morph (render/scene/field_expression.h).
   [[nodiscard]] bool isBlended() const { return softness > 0 || morph; }

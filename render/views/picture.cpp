@@ -230,6 +230,12 @@ void requirePicture(const Scene& scene, const RenderOptions& options) {
         "quadrics cannot be drawn beside a soft expression or a morph; draw them alone");
   if (!scene.quadrics.empty() && options.thickness)
     throw levelset::UsageError("the thickness of quadrics cannot be measured; omit --thickness");
+  if (!scene.terrains.empty() && scene.isBlended())
+    throw levelset::UsageError(
+        "a terrain cannot be drawn beside a soft expression or a morph; draw it alone");
+  if (!scene.terrains.empty() && options.thickness)
+    throw levelset::UsageError("the thickness of a terrain cannot be measured; omit --thickness");
+  for (const TerrainPart& part : scene.terrains) requireRamp(part.ramp);
   if (scene.segmented && options.filter != Filter::Trilinear)
     throw levelset::UsageError(fmt::format(
         "segmentations support only the trilinear filter, not {}; omit the filter, or make a mesh "
@@ -327,6 +333,13 @@ std::map<std::string, std::string> sceneAttributes(const Scene& scene,
   for (const QuadricPart& part : scene.quadrics)
     quadrics += fmt::format("{}{} quadrics", quadrics.empty() ? "" : ", ", part.caster.count());
   if (!quadrics.empty()) attributes["ls:quadrics"] = quadrics;
+  std::string terrains;
+  for (const TerrainPart& part : scene.terrains) {
+    const levelset::HeightField& field = part.caster.field();
+    terrains += fmt::format("{}{}x{} samples {:016x}", terrains.empty() ? "" : ", ", field.columns,
+                            field.rows, field.contentHash());
+  }
+  if (!terrains.empty()) attributes["ls:terrain"] = terrains;
   if (scene.volumePart) {
     const DirectVolume& volume = scene.volumePart->volume;
     attributes["ls:volume"] = fmt::format("volume {:016x}", volume.volume().contentHash());

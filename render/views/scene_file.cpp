@@ -12,6 +12,7 @@
 #include "levelset/files/json_text.h"
 #include "levelset/memory/memory_limit.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/terrain/files/height_field_file.h"
 #include "levelset/transform/transform.h"
 #include "levelset/volume_files/volume_file.h"
 #include "render/scene/field_expression.h"
@@ -255,10 +256,10 @@ struct PlainMembers {
 PlainMembers readPlainMembers(const Reader& reader, const Json& json, const std::string& where,
                               const Scene& scene) {
   PlainMembers part;
-  reader.readPart(
-      json,
-      scene.solids.size() + scene.meshes.size() + scene.beziers.size() + scene.quadrics.size() + 1,
-      where, part);
+  reader.readPart(json,
+                  scene.solids.size() + scene.meshes.size() + scene.beziers.size() +
+                      scene.quadrics.size() + scene.terrains.size() + 1,
+                  where, part);
   return part;
 }
 
@@ -280,6 +281,55 @@ void readQuadricPart(const Reader& reader, const Json& json, const std::filesyst
   QuadricCaster caster(readQuadrics(reader.partFile(json, file, where), options.maxMemory),
                        options.maxMemory);
   scene.quadrics.push_back({std::move(caster), part.id, part.name});
+}
+
+/// Box of a member that is a list of its lower and its upper corner.
+Imath::Box3d readBox(const Reader& reader, const Json& json, const char* name,
+                     const std::string& where) {
+  const Json& corners = reader.member(json, name, where);
+  if (!corners.is_array() || corners.size() != 2)
+    reader.refuse(where, fmt::format("has an \"{}\" that is not a list of two corners", name));
+  const Json both = {{"low", corners[0]}, {"high", corners[1]}};
+  return {reader.point(both, "low", where), reader.point(both, "high", where)};
+}
+
+std::vector<HeightColour> readRamp(const Reader& reader, const Json& json,
+                                   const std::string& where) {
+  const Json& list = reader.member(json, "ramp", where);
+  if (!list.is_array()) reader.refuse(where, "has a \"ramp\" that is not a list");
+  std::vector<HeightColour> ramp;
+  for (const Json& entry : list) {
+    reader.requireKnown(entry, {"height", "colour"}, where);
+    ramp.push_back(
+        {reader.number(entry, "height", where), Imath::C3f(reader.point(entry, "colour", where))});
+  }
+  reader.withContext(where, [&] { requireRamp(ramp); });
+  return ramp;
+}
+
+void readTerrainPart(const Reader& reader, const Json& json, const std::filesystem::path& file,
+                     const ReadSceneOptions& options, const levelset::Progress& progress,
+                     Scene& scene) {
+  const std::string where = fmt::format("terrain {}", scene.terrains.size() + 1);
+  reader.requireKnown(
+      json, {"name", "file", "transform", "colour", "id", "smooth", "outside", "ramp"}, where);
+  const PlainMembers part = readPlainMembers(reader, json, where, scene);
+  TerrainOptions how;
+  if (json.contains("transform")) how.transform = reader.matrix(json, where);
+  if (json.contains("outside")) how.outside = readBox(reader, json, "outside", where);
+  if (json.contains("smooth")) {
+    if (!json.at("smooth").is_boolean())
+      reader.refuse(where, "has a \"smooth\" that is not true or false");
+    how.isSmooth = json.at("smooth").get<bool>();
+  }
+  std::vector<HeightColour> ramp;
+  if (json.contains("ramp")) ramp = readRamp(reader, json, where);
+  auto field = std::make_shared<const levelset::HeightField>(levelset::readHeightField(
+      reader.partFile(json, file, where), {.maxMemory = options.maxMemory, .progress = progress}));
+  how.maxBytes = options.maxMemory - std::min(options.maxMemory, field->memoryUse());
+  TerrainCaster caster =
+      reader.withContext(where, [&] { return TerrainCaster(std::move(field), how); });
+  scene.terrains.push_back({std::move(caster), part.colour, part.id, part.name, std::move(ramp)});
 }
 
 /// The volume with its grid placed in the world by a transform.
@@ -362,7 +412,7 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     reader.refuse(whole, fmt::format("is not of version {}", kVersion));
   reader.requireKnown(json,
                       {"format", "version", "camera", "light", "ambient", "solids", "meshes",
-                       "beziers", "quadrics", "volumes", "csg", "soft", "morph"},
+                       "beziers", "quadrics", "terrains", "volumes", "csg", "soft", "morph"},
                       whole);
   ViewedScene viewed;
   Scene& scene = viewed.scene;
@@ -380,15 +430,17 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   const Json& volumes = json.contains("volumes") ? json.at("volumes") : none;
   const Json& beziers = json.contains("beziers") ? json.at("beziers") : none;
   const Json& quadrics = json.contains("quadrics") ? json.at("quadrics") : none;
-  const Json* const lists[] = {&solids, &meshes, &volumes, &beziers, &quadrics};
+  const Json& terrains = json.contains("terrains") ? json.at("terrains") : none;
+  const Json* const lists[] = {&solids, &meshes, &volumes, &beziers, &quadrics, &terrains};
   if (!std::all_of(std::begin(lists), std::end(lists),
                    [](const Json* l) { return l->is_array(); }) ||
       std::all_of(std::begin(lists), std::end(lists), [](const Json* l) { return l->empty(); }))
     reader.refuse(whole,
-                  "has no parts; list one in \"solids\", \"meshes\", \"volumes\", \"beziers\" or "
-                  "\"quadrics\"");
+                  "has no parts; list one in \"solids\", \"meshes\", \"volumes\", \"beziers\", "
+                  "\"quadrics\" or \"terrains\"");
   if (volumes.size() > 1) reader.refuse(whole, "has several \"volumes\", but a scene can have one");
-  scene_file::Parts parts(options.progress, solids.size() + meshes.size() + volumes.size());
+  scene_file::Parts parts(options.progress,
+                          solids.size() + meshes.size() + terrains.size() + volumes.size());
   // The memory limit applies to the sum of all parts, so it shrinks with each one that is read.
   ReadSceneOptions rest = options;
   rest.maxMemory = levelset::memoryLimit(options.maxMemory);
@@ -411,6 +463,10 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
     readQuadricPart(reader, entry, file, rest, scene);
     spend(scene.quadrics.back().caster.bytes());
   }
+  for (const Json& entry : terrains) {
+    readTerrainPart(reader, entry, file, rest, parts.next(), scene);
+    spend(scene.terrains.back().caster.bytes());
+  }
   for (const Json& entry : volumes) readVolumePart(reader, entry, file, rest, parts.next(), scene);
   reader.withContext(whole, [&] { scene_file::requireNames(scene); });
   std::set<std::uint32_t> ids;
@@ -418,7 +474,8 @@ ViewedScene readScene(const std::filesystem::path& file, const ReadSceneOptions&
   if (!std::all_of(scene.solids.begin(), scene.solids.end(), isNew) ||
       !std::all_of(scene.meshes.begin(), scene.meshes.end(), isNew) ||
       !std::all_of(scene.beziers.begin(), scene.beziers.end(), isNew) ||
-      !std::all_of(scene.quadrics.begin(), scene.quadrics.end(), isNew))
+      !std::all_of(scene.quadrics.begin(), scene.quadrics.end(), isNew) ||
+      !std::all_of(scene.terrains.begin(), scene.terrains.end(), isNew))
     reader.refuse(whole, "gives the same \"id\" to two parts; give each part its own");
   if (json.contains("csg"))
     scene.csg = CsgExpression(reader.text(json, "csg", whole), scene_file::operandNames(scene));

@@ -24,9 +24,9 @@ struct ViewedScene {
 /// True for the format "json" and for file names with the extension .json, which readScene() reads.
 [[nodiscard]] bool isSceneFormat(const std::string& name);
 
-/// Writes each solid, mesh and Bézier volume into the folder of the scene file, as STEM-NAME.vdb,
-/// STEM-NAME.ply and STEM-NAME.json. STEM is the scene file's name without extension. Then it
-/// writes the scene file. Existing files are replaced.
+/// Writes each solid, mesh, Bézier volume and terrain into the folder of the scene file, as
+/// STEM-NAME.vdb, STEM-NAME.ply, STEM-NAME.json and STEM-NAME.asc. STEM is the scene file's name
+/// without extension. Then it writes the scene file. Existing files are replaced.
 /// @throws levelset::IoError when a file cannot be written
 /// @throws levelset::InvalidInput for invalid colours
 /// @throws levelset::UsageError for an invalid opacity, and for mapped textures, which a file

@@ -12,6 +12,7 @@
 #include "levelset/file_target.h"
 #include "levelset/files/band_file.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/terrain/files/height_field_file.h"
 #include "render/scene/field_expression.h"
 #include "render/views/bezier_file.h"
 #include "render/views/picture.h"
@@ -57,6 +58,20 @@ void requireColour(const Imath::C3f& colour) {
                       colour.x, colour.y, colour.z));
 }
 
+Json terrainJson(const TerrainPart& part, const std::string& file) {
+  Json entry = {
+      {"name", part.name}, {"file", file}, {"colour", colourJson(part.colour)}, {"id", part.id}};
+  const TerrainOptions& options = part.caster.options();
+  if (options.transform != Imath::M44d())
+    for (int i = 0; i < 16; ++i) entry["transform"].push_back(options.transform[i / 4][i % 4]);
+  if (!options.isSmooth) entry["smooth"] = false;
+  if (options.outside)
+    entry["outside"] = {toJson(options.outside->min), toJson(options.outside->max)};
+  for (const auto& [height, colour] : part.ramp)
+    entry["ramp"].push_back({{"height", height}, {"colour", colourJson(colour)}});
+  return entry;
+}
+
 /// File of a solid or mesh with the given name, in the folder of the scene file `file`.
 std::filesystem::path fileBeside(const std::filesystem::path& file, const std::string& name,
                                  const char* extension) {
@@ -96,6 +111,7 @@ void requireNames(const Scene& scene) {
   for (const MeshPart& part : scene.meshes) names.push_back(part.name);
   for (const BezierPart& part : scene.beziers) names.push_back(part.name);
   for (const QuadricPart& part : scene.quadrics) names.push_back(part.name);
+  for (const TerrainPart& part : scene.terrains) names.push_back(part.name);
   if (scene.volumePart) names.push_back(scene.volumePart->name);
   requireSceneNames(names);
 }
@@ -135,6 +151,10 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
   requireFields(scene);
   for (const Solid& solid : scene.solids) requireColour(solid.colour);
   for (const MeshPart& part : scene.meshes) requireColour(part.colour);
+  for (const TerrainPart& part : scene.terrains) {
+    requireColour(part.colour);
+    requireRamp(part.ramp);
+  }
   Json json;
   json["format"] = scene_file::kFormat;
   json["version"] = scene_file::kVersion;
@@ -162,13 +182,17 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
     json["quadrics"].push_back({{"name", part.name},
                                 {"file", fileBeside(file, part.name, ".json").filename().string()},
                                 {"id", part.id}});
+  for (const TerrainPart& part : scene.terrains)
+    json["terrains"].push_back(
+        terrainJson(part, fileBeside(file, part.name, ".asc").filename().string()));
   if (!scene.csg.isEmpty()) json["csg"] = scene.csg.text();
   if (scene.softness > 0) json["soft"] = scene.softness;
   if (scene.morph) json["morph"] = *scene.morph;
 
   const std::string text = textOf(json, file);
   levelset::FileTarget target(file);
-  scene_file::Parts parts(progress, scene.solids.size() + scene.meshes.size());
+  scene_file::Parts parts(progress,
+                          scene.solids.size() + scene.meshes.size() + scene.terrains.size());
   for (const Solid& solid : scene.solids)
     levelset::writeBand(fileBeside(file, solid.name, ".vdb"), solid.band,
                         {.name = solid.name, .progress = parts.next()});
@@ -179,6 +203,9 @@ void writeScene(const std::filesystem::path& file, const ViewedScene& viewed,
     writeBezierVolume(fileBeside(file, part.name, ".json"), part.caster.volume());
   for (const QuadricPart& part : scene.quadrics)
     writeQuadrics(fileBeside(file, part.name, ".json"), part.caster.model());
+  for (const TerrainPart& part : scene.terrains)
+    levelset::writeHeightField(fileBeside(file, part.name, ".asc"), part.caster.field(),
+                               {.progress = parts.next()});
   {
     std::ofstream stream(target.path(), std::ios::binary);
     stream << text << '\n';

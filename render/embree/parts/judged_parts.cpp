@@ -14,6 +14,7 @@ JudgedParts::JudgedParts(const Scene& scene)
     : segmented_(scene.segmented),
       beziers_(scene.beziers),
       quadrics_(scene.quadrics),
+      terrains_(scene.terrains),
       firstSolid_(scene.solids.size() + scene.mapped.size()) {
   if (segmented_) {
     interfaces_.emplace(segmented_->caster);
@@ -26,6 +27,11 @@ JudgedParts::JudgedParts(const Scene& scene)
   for (const BezierPart& part : beziers_) bounds_.extendBy(part.caster.bounds());
   for (const QuadricPart& part : quadrics_) {
     quadricJudges_.emplace_back(part.caster.model());
+    bounds_.extendBy(part.caster.bounds());
+  }
+  firstTerrain_ = firstQuadric_ + quadrics_.size();
+  for (const TerrainPart& part : terrains_) {
+    terrainJudges_.emplace_back(part.caster);
     bounds_.extendBy(part.caster.bounds());
   }
 }
@@ -56,6 +62,18 @@ Hit JudgedParts::firstHit(const Camera::Ray& ray, bool onlyOpaque) const {
         !nearest.found || nearest.solid < firstQuadric_ || found.distance < nearest.distance;
     if (found.found && isFirst)
       take(quadrics_[n].hitOf(ray, found.distance, found.normal, found.colour, firstQuadric_ + n));
+  }
+  for (std::size_t n = 0; n < terrains_.size(); ++n) {
+    const JudgedGround found = terrainJudges_[n].firstHit(rest);
+    const bool isFirst =
+        !nearest.found || nearest.solid < firstTerrain_ || found.distance < nearest.distance;
+    if (!found.found || !isFirst) continue;
+    const TerrainHit hit{.found = true,
+                         .distance = found.distance,
+                         .normal = found.normal,
+                         .facetNormal = found.facetNormal,
+                         .height = found.height};
+    take(terrains_[n].hitOf(ray, hit, firstTerrain_ + n));
   }
   return nearest;
 }

@@ -13,20 +13,22 @@
 
 #include "render/bezier/bezier_judge.h"
 #include "render/embree/quadrics/quadric_judge.h"
+#include "render/embree/terrain/terrain_judge.h"
 #include "render/hit.h"
 #include "render/scene/scene.h"
 #include "render/segmented/interface_judge.h"
 
 namespace render {
 
-/// Parts of a scene with judges of their own: a segmented field, Bézier volumes and quadrics.
+/// Parts of a scene with judges of their own: a segmented field, Bézier volumes, quadrics and
+/// terrains.
 /// Methods may run concurrently.
 class JudgedParts {
  public:
   explicit JudgedParts(const Scene& scene);
 
   [[nodiscard]] bool isEmpty() const {
-    return !interfaces_ && beziers_.empty() && quadrics_.empty();
+    return !interfaces_ && beziers_.empty() && quadrics_.empty() && terrains_.empty();
   }
   [[nodiscard]] const Imath::Box3d& bounds() const { return bounds_; }  ///< world space
 
@@ -65,10 +67,13 @@ class JudgedParts {
   std::vector<std::size_t> operands_;  // indices in beziers_ of those that the expression names
   std::vector<QuadricPart> quadrics_;
   std::vector<QuadricJudge> quadricJudges_;
+  std::vector<TerrainPart> terrains_;
+  std::vector<TerrainJudge> terrainJudges_;
   mutable tbb::enumerable_thread_specific<std::vector<BezierJudge>> bezierJudges_;
   std::size_t firstSolid_ = 0;    // Hit::solid of the segmented field, or of the first part
   std::size_t firstBezier_ = 0;   // Hit::solid of the first Bézier volume
   std::size_t firstQuadric_ = 0;  // Hit::solid of the first part with quadrics
+  std::size_t firstTerrain_ = 0;  // Hit::solid of the first terrain
 };
 
 }  // namespace render

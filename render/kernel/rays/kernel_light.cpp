@@ -103,6 +103,11 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
       if (light[i] >= kLeastTransmittance &&
           part.caster.isOccluded({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance}))
         light[i] = 0;
+  for (const TerrainPart& part : terrains_)
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      if (light[i] >= kLeastTransmittance &&
+          part.caster.isOccluded({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance}))
+        light[i] = 0;
   return light;
 }
 
