@@ -14,7 +14,6 @@
 #include "levelset/error.h"
 #include "levelset/geometry/vertex_normals.h"
 #include "levelset/segmented/meshing/segmented_to_mesh.h"
-#include "levelset/terrain/ground_mesh.h"
 
 namespace pipeline {
 
@@ -204,6 +203,9 @@ const levelset::Molecule& Value::molecule() const {
   return *as<std::shared_ptr<const levelset::Molecule>>(Kind::Molecule);
 }
 
+std::shared_ptr<const levelset::HeightField> Value::sharedTerrain() const {
+  return as<std::shared_ptr<const levelset::HeightField>>(Kind::Terrain);
+}
 const levelset::HeightField& Value::terrain() const {
   return *as<std::shared_ptr<const levelset::HeightField>>(Kind::Terrain);
 }
@@ -346,8 +348,7 @@ render::ViewedScene sceneOf(const Value& drawn) {
   else if (drawn.kind() == Kind::Adaptive)
     viewed.scene.meshes.push_back({smoothMesh(levelset::adaptiveToMesh(drawn.adaptive()))});
   else if (drawn.kind() == Kind::Terrain)
-    viewed.scene.meshes.push_back(
-        {smoothMesh(levelset::groundMesh(drawn.terrain(), {.allowMissing = true}))});
+    viewed.scene.terrains.push_back({.caster = render::TerrainCaster(drawn.sharedTerrain())});
   else if (drawn.kind() == Kind::Segmentation)
     viewed.scene.meshes = partsOf(drawn.segmentation());
   else

@@ -156,6 +156,7 @@ class Value {
   [[nodiscard]] const levelset::Molecule& molecule() const;
   [[nodiscard]] const levelset::HeightField& terrain() const;
   [[nodiscard]] const DeformationValue& deformation() const;
+  [[nodiscard]] std::shared_ptr<const levelset::HeightField> sharedTerrain() const;
 
   /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
   /// it from the value on the first call.
@@ -180,8 +181,7 @@ class Value {
 };
 
 /// Builds a scene that shows a level set, a mesh, an adaptive field, a segmentation, a terrain or a
-/// scene. The value must outlive the result. Of adaptive fields, segmentations and terrains it
-/// makes meshes.
+/// scene. The value must outlive the result. Of adaptive fields and segmentations it makes meshes.
 [[nodiscard]] render::ViewedScene sceneOf(const Value& drawn);
 
 }  // namespace pipeline

@@ -212,6 +212,7 @@ ClippedScene::ClippedScene(const render::Scene& scene, const Imath::Box3d& bound
   for (const render::Solid& solid : scene_.solids) id = std::max(id, solid.id + 1);
   for (const render::MeshPart& part : scene_.meshes) id = std::max(id, part.id + 1);
   for (const render::BezierPart& part : scene_.beziers) id = std::max(id, part.id + 1);
+  for (const render::TerrainPart& part : scene_.terrains) id = std::max(id, part.id + 1);
   scene_.solids.push_back({.band = box_, .colour = {0.75f, 0.75f, 0.75f}, .id = id, .name = cut});
   scene_.csg = render::CsgExpression(
       fmt::format("({}) - {}", scene.csg.isEmpty() ? all : scene.csg.text(), cut), names);

@@ -47,6 +47,8 @@ std::string nameAt(const render::Scene& scene, std::uint32_t id, const std::vect
     if (part.id == id && name.empty()) return part.name;
   for (const render::QuadricPart& part : scene.quadrics)
     if (part.id == id && name.empty()) return part.name;
+  for (const render::TerrainPart& part : scene.terrains)
+    if (part.id == id && name.empty()) return part.name;
   for (std::size_t i = 0; i < phi.size() && least == INFINITY; ++i) consider(i, phi[i]);
   return name;
 }

@@ -94,8 +94,8 @@ class DiscCamera {
 }  // namespace
 
 bool canSplat(const render::Scene& scene) {
-  return !scene.solids.empty() && scene.meshes.empty() && scene.csg.isEmpty() &&
-         !scene.isBlended() && scene.isOpaque() && !scene.volumePart &&
+  return !scene.solids.empty() && scene.meshes.empty() && scene.terrains.empty() &&
+         scene.csg.isEmpty() && !scene.isBlended() && scene.isOpaque() && !scene.volumePart &&
          std::none_of(scene.solids.begin(), scene.solids.end(),
                       [](const render::Solid& solid) { return solid.band.isOpenSurface(); });
 }

@@ -84,13 +84,14 @@ void showVolume(const fs::path& file, const levelset::Volume& volume, const Open
        .volume = std::make_shared<const render::VolumeSurface>(model.volume->surface)});
 }
 
-/// Paths of the level sets, meshes, volumes, Bézier volumes and quadrics that a scene file names.
+/// Paths of the level sets, meshes, volumes, Bézier volumes, quadrics and terrains that a scene
+/// file names.
 /// @pre readScene() accepts the file
 std::vector<fs::path> solidFilesOf(const fs::path& scene) {
   std::vector<fs::path> files;
   std::ifstream stream(scene);
   const auto json = nlohmann::json::parse(stream, nullptr, false);
-  for (const char* list : {"solids", "meshes", "volumes", "beziers", "quadrics"}) {
+  for (const char* list : {"solids", "meshes", "volumes", "beziers", "quadrics", "terrains"}) {
     if (!json.is_object() || !json.contains(list) || !json[list].is_array()) continue;
     for (const auto& part : json[list])
       if (part.is_object() && part.contains("file") && part["file"].is_string())
@@ -150,6 +151,10 @@ void measureModel(Model& model) {
     model.description +=
         fmt::format("{}{} mesh{}", model.description.empty() ? "" : "; ", model.scene.meshes.size(),
                     model.scene.meshes.size() == 1 ? "" : "es");
+  if (!model.scene.terrains.empty())
+    model.description +=
+        fmt::format("{}{} terrain{}", model.description.empty() ? "" : "; ",
+                    model.scene.terrains.size(), model.scene.terrains.size() == 1 ? "" : "s");
   if (model.scene.volumePart)
     model.description += fmt::format("{}1 volume", model.description.empty() ? "" : "; ");
   if (!model.patches.empty())

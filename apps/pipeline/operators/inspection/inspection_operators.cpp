@@ -385,6 +385,12 @@ Json valueInfo(const Value& value, Invocation& in) {
                                   {"id", part.id},
                                   {"quadrics", part.caster.count()},
                                   {"bytes", part.caster.bytes()}});
+    for (const render::TerrainPart& part : scene.terrains)
+      json["terrains"].push_back({{"name", part.name},
+                                  {"id", part.id},
+                                  {"columns", part.caster.field().columns},
+                                  {"rows", part.caster.field().rows},
+                                  {"bytes", part.caster.bytes()}});
     for (const render::MappedTexture& texture : scene.mapped)
       json["mapped"].push_back({{"name", texture.name},
                                 {"id", texture.id},

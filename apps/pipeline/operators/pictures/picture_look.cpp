@@ -71,10 +71,12 @@ const std::vector<Preset>& presets() {
 
 /// Requires parts whose thickness is measured. @throws UsageError
 void requireThickness(const Invocation& in, const render::Scene& scene) {
-  if (scene.quadrics.empty() && scene.beziers.empty() && scene.mapped.empty()) return;
+  if (scene.quadrics.empty() && scene.beziers.empty() && scene.mapped.empty() &&
+      scene.terrains.empty())
+    return;
   throw UsageError(fmt::format(
-      "render: --xray needs level sets or meshes, but the scene has quadrics, Bézier volumes or "
-      "mapped textures; {}",
+      "render: --xray needs level sets or meshes, but the scene has quadrics, Bézier volumes, "
+      "terrains or mapped textures; {}",
       in.isAssumed("xray") ? "use another --preset" : "leave it out"));
 }
 
@@ -105,7 +107,12 @@ void colourParts(const Invocation& in, render::Scene& scene) {
   for (render::Solid& solid : scene.solids) solid.colour = colour;
   for (render::MeshPart& mesh : scene.meshes) mesh.colour = colour;
   for (render::BezierPart& part : scene.beziers) part.colour = colour;
-  const bool isColoured = !scene.solids.empty() || !scene.meshes.empty() || !scene.beziers.empty();
+  for (render::TerrainPart& part : scene.terrains) {
+    part.colour = colour;
+    part.ramp.clear();
+  }
+  const bool isColoured = !scene.solids.empty() || !scene.meshes.empty() ||
+                          !scene.beziers.empty() || !scene.terrains.empty();
   const bool hasOwnColours = !scene.quadrics.empty() || scene.segmented;
   if (!isColoured && hasOwnColours && !in.isAssumed("colour"))
     throw UsageError("render: these parts have their own colours; leave --colour out");

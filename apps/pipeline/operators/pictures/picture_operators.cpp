@@ -15,6 +15,7 @@
 #include "apps/pipeline/operators/pictures/picture_optics.h"
 #include "apps/pipeline/operators/pictures/segmented_pictures.h"
 #include "apps/pipeline/operators/pictures/volume_pictures.h"
+#include "apps/pipeline/operators/terrain/terrain_pictures.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
 #include "levelset/file_target.h"
@@ -40,6 +41,7 @@ render::Scene sceneOf(Invocation& in) {
   render::ViewedScene viewed = isVolumeKind(drawn.kind())           ? volumeScene(in)
                                : drawn.kind() == Kind::Segmentation ? segmentedScene(in)
                                : drawn.kind() == Kind::Molecule     ? moleculeScene(in)
+                               : drawn.kind() == Kind::Terrain      ? terrainScene(in)
                                                                     : sceneOf(drawn);
   viewed.scene.camera = cameraOf(in, drawn.plan().bounds,
                                  viewed.hasCamera ? &viewed.scene.camera : nullptr, &viewed.scene);
@@ -108,6 +110,7 @@ void validateDraw(const Invocation& asked) {
   validateVolumePicture(in);
   validateHide(in);
   validateMoleculePicture(in);
+  validateTerrainPicture(in);
   if (in.given("reflection-lines") && style != "reflection-lines")
     throw UsageError(fmt::format(
         "render: --style {} shows no reflections; leave --reflection-lines out", style));
@@ -247,8 +250,9 @@ Value draw(Invocation& in) {
   };
   render::Image image = isStereo(in) ? drawStereo(in, scene, eyeOf) : drawn(scene);
   const auto read = image.attributes.find("ls:read");
-  if (read != image.attributes.end() && (!scene.solids.empty() || !scene.meshes.empty() ||
-                                         !scene.quadrics.empty() || scene.segmented))
+  if (read != image.attributes.end() &&
+      (!scene.solids.empty() || !scene.meshes.empty() || !scene.quadrics.empty() ||
+       !scene.terrains.empty() || scene.segmented))
     in.notes.notes.push_back(fmt::format("render: {}", read->second));
   if (const auto cast = image.attributes.find("ls:onProcessor"); cast != image.attributes.end())
     in.notes.notes.push_back(fmt::format("render: {}", cast->second));
@@ -339,8 +343,8 @@ Operator renderOperator() {
       .name = "render",
       .group = "Pictures",
       .summary =
-          "draw a level set, isosurface, mesh, segmentation, molecule or scene to an EXR with all "
-          "layers, or a PNG",
+          "draw a level set, isosurface, mesh, segmentation, molecule, terrain or scene to an EXR "
+          "with all layers, or a PNG",
       .details =
           "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y N.Z, P.X "
           "P.Y P.Z, curvature.mean .gauss .k1 .k2, id. Without --from, the view is the scene's "
@@ -470,6 +474,7 @@ Operator renderOperator() {
   std::vector<Param> ofKinds = volumePictureParams();
   ofKinds.push_back(hideParam());
   for (Param& param : moleculePictureParams()) ofKinds.push_back(std::move(param));
+  for (Param& param : terrainPictureParams()) ofKinds.push_back(std::move(param));
   const auto filter = std::find_if(picture.params.begin(), picture.params.end(),
                                    [](const Param& param) { return param.name == "filter"; });
   picture.params.insert(std::next(filter), ofKinds.begin(), ofKinds.end());

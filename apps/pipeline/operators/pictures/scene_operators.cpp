@@ -11,6 +11,7 @@
 #include "apps/pipeline/operators/declarations.h"
 #include "apps/pipeline/operators/pictures/camera_options.h"
 #include "apps/pipeline/operators/pictures/volume_pictures.h"
+#include "apps/pipeline/operators/terrain/terrain_pictures.h"
 #include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/values/units.h"
@@ -157,6 +158,19 @@ Value makeScene(Invocation& in) {
       scene.volumePart->name = names[i];
       continue;
     }
+    if (in.operands[i].kind() == Kind::Terrain) {
+      if (opacities[i] != 1)
+        throw UsageError(fmt::format(
+            "scene: --opacities {} makes the terrain '{}' transparent, which is not possible; give "
+            "1 for it",
+            opacities[i], names[i]));
+      render::TerrainPart part = terrainPartOf(in, i);
+      part.colour = colour;
+      part.id = id;
+      part.name = names[i];
+      scene.terrains.push_back(std::move(part));
+      continue;
+    }
     if (in.operands[i].kind() == Kind::Mesh) {
       scene.meshes.push_back({std::make_shared<const levelset::TriMesh>(in.mesh(i)), colour, id,
                               names[i], opacities[i]});
@@ -198,6 +212,7 @@ Value makeScene(Invocation& in) {
 void validateScene(const Invocation& in) {
   validateCamera(in);
   validateTransfer(in);
+  validateTerrainPicture(in);
   if (in.given("soft") && !in.given("csg"))
     throw UsageError(
         "scene: --soft blends the solids of a CSG expression; give --csg, too, as --csg 'a | b'");
@@ -218,13 +233,15 @@ Operator sceneOperator() {
       .name = "scene",
       .group = "Pictures",
       .summary =
-          "combine level sets, meshes, Bézier volumes and a volume in one picture, or solids by a "
-          "CSG expression",
+          "combine level sets, meshes, terrains, Bézier volumes and a volume in one picture, or "
+          "solids by a CSG expression",
       .details =
           "With --csg the rays of 'render' combine the solids: a | b is the union, a & b the "
           "intersection, a - b the difference. Solids are not resampled; each keeps its voxels. "
-          "The expression uses the names that --as gave to the solids. Meshes are drawn beside "
-          "them, with the normals and colours of their vertices if they have any. Coincident "
+          "The expression uses the names that --as gave to the solids. Meshes and terrains are "
+          "drawn "
+          "beside them, meshes with the normals and colours of their vertices if they have any. "
+          "Coincident "
           "surfaces on different grids are separated by rounding only, so let the subtracted solid "
           "protrude. --soft blends the distances to the solids: surfaces closer than this length "
           "merge. --morph interpolates between the distances of two solids. One part may be a "
@@ -262,7 +279,7 @@ Operator sceneOperator() {
             .doc = "opacities of the parts, above 0 and up to 1, separated by blanks; below 1 a "
                    "surface is transparent in the layers R G B A and casts a weaker shadow; a "
                    "volume has the opacities of --transfer instead"}},
-      .operands = {{Kind::Band, Kind::Mesh, Kind::Volume, Kind::Field, Kind::Scene}},
+      .operands = {{Kind::Band, Kind::Mesh, Kind::Volume, Kind::Field, Kind::Scene, Kind::Terrain}},
       .takesMore = true,
       .readsNames = true,
       .resultKind = [](const Invocation&) { return Kind::Scene; },
@@ -271,6 +288,7 @@ Operator sceneOperator() {
       .validate = validateScene,
   };
   for (const Param& param : transferParams()) scene.params.push_back(param);
+  for (const Param& param : terrainPictureParams()) scene.params.push_back(param);
   addCameraParams(scene.params);
   return scene;
 }

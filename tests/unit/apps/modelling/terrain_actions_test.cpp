@@ -229,6 +229,28 @@ TEST_F(TerrainActions, MeshAndRenderShowTheGround) {
                 "--sharp applies to a level set, not to a terrain");
   expectRefusal("sphere --radius 1 --voxel 0.2 ! mesh --allow-missing", 2, "is for a terrain");
   EXPECT_EQ(levelsmith("read hole.asc ! render a.png --size 32x24 --up 0,0,1").code, 0);
+  EXPECT_EQ(
+      levelsmith("read hole.asc ! render a.exr --size 32x24 --up 0,0,1 --renderer both --facets")
+          .code,
+      0);
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! render a.png --facets", 2,
+                "--facets is for terrains");
+  expectRefusal("read plane.asc ! render a.png --outside '0,0,1 8,4,2'", 3, "beyond the heights");
+  expectRefusal("read plane.asc ! terrain --crop '0,0,0 0,9,9' ! render a.png", 3, "at least 2x2");
+}
+
+TEST_F(TerrainActions, SceneReplacesGroundByASolid) {
+  const std::string scene =
+      "read plane.asc --as land ! solidify --base -2 --voxel 0.5 --as earth ! scene @land @earth ";
+  const Json info = json(scene + "--outside '-1,-1,-9 9,5,9' ! info --json");
+  EXPECT_EQ(info["terrains"][0]["name"], "land");
+  EXPECT_EQ(info["terrains"][0]["columns"], 5);
+  EXPECT_EQ(info["solids"][0]["name"], "earth");
+  ASSERT_EQ(levelsmith(scene + "! write a.json").code, 0);
+  EXPECT_EQ(levelsmith("read a.json ! render a.png --size 32x24 --up 0,0,1").code, 0);
+  expectRefusal(scene + "--opacities '0.5 1'", 2, "transparent");
+  expectRefusal("sphere --radius 1 --voxel 0.2 ! scene --outside '0,0,0 1,1,1'", 2,
+                "--outside is for terrains");
 }
 
 TEST_F(TerrainActions, SculptChangesHeights) {
