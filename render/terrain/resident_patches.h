@@ -5,13 +5,13 @@
 #include <cstdint>
 #include <functional>
 #include <list>
-#include <map>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <span>
 #include <string>
 #include <thread>
+#include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "levelset/terrain/tiles/patch_store.h"
@@ -89,11 +89,11 @@ class ResidentPatches {
   std::shared_ptr<const PatchHeights> rootHeights_;
   mutable std::mutex mutex_;
   std::condition_variable_any hasWork_;
-  std::map<TerrainPatch, Entry> entries_;  // without the root
-  std::list<TerrainPatch> uses_;           // the patches of entries_, last used first
-  std::set<TerrainPatch> kept_;            // needed by the last request
-  std::vector<TerrainPatch> waiting_;      // not yet read, the most important last
-  std::set<TerrainPatch> failed_;
+  std::unordered_map<TerrainPatch, Entry, PatchHash> entries_;  // without the root
+  std::list<TerrainPatch> uses_;                      // the patches of entries_, last used first
+  std::unordered_set<TerrainPatch, PatchHash> kept_;  // needed by the last request
+  std::vector<TerrainPatch> waiting_;                 // not yet read, the most important last
+  std::unordered_set<TerrainPatch, PatchHash> failed_;
   std::vector<std::string> warnings_;
   std::size_t beingRead_ = 0, mostCount_ = 1;
   bool isWorking_ = false;  // the thread is reading or calls onArrival()

@@ -7,9 +7,7 @@ namespace render {
 
 TerrainCut::TerrainCut(const PatchGrid& grid, const TerrainView& view, std::size_t mostPatches)
     : grid_(grid), view_(view) {
-  const std::size_t levels = grid.layout().pyramid.levels.size();
-  nodes_.resize(levels);
-  splits_.resize(levels);
+  splits_.resize(grid.layout().pyramid.levels.size());
   std::vector<TerrainPatch> now;
   if (isVisible(grid.root())) now.push_back(grid.root());
   for (std::size_t total = now.size(); !now.empty() && total <= mostPatches;) {
@@ -26,15 +24,12 @@ TerrainCut::TerrainCut(const PatchGrid& grid, const TerrainView& view, std::size
 }
 
 TerrainCut::Node& TerrainCut::node(const TerrainPatch& patch) {
-  const std::uint64_t key = static_cast<std::uint64_t>(static_cast<unsigned>(patch.row)) << 32 |
-                            static_cast<unsigned>(patch.column);
-  auto& level = nodes_[static_cast<std::size_t>(patch.level)];
-  const auto found = level.find(key);
-  if (found != level.end()) return found->second;
+  const auto found = nodes_.find(patch);
+  if (found != nodes_.end()) return found->second;
   std::optional<TerrainView::Planes> planes = TerrainView::kAllPlanes;
   if (patch.level < grid_.topLevel()) planes = node(PatchGrid::parent(patch)).crossed;
   if (planes) planes = view_.crossed(grid_.box(patch), *planes);
-  return level.emplace(key, Node{.crossed = planes}).first->second;
+  return nodes_.emplace(patch, Node{.crossed = planes}).first->second;
 }
 
 TerrainPatch TerrainCut::visibleAncestor(TerrainPatch patch) {

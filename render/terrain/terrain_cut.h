@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <optional>
 #include <unordered_map>
@@ -63,8 +62,8 @@ class TerrainCut {
 
   const PatchGrid& grid_;
   const TerrainView& view_;
-  std::vector<std::unordered_map<std::uint64_t, Node>> nodes_;  // for each level
-  std::vector<std::vector<TerrainPatch>> splits_;               // for each level
+  std::unordered_map<TerrainPatch, Node, PatchHash> nodes_;
+  std::vector<std::vector<TerrainPatch>> splits_;  // for each level
   int formation_ = 0;
 };
 

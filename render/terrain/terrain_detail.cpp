@@ -3,7 +3,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <map>
+#include <unordered_map>
 #include <utility>
 
 #include "levelset/error.h"
@@ -28,13 +28,16 @@ struct TerrainDetail::Patches {
   PatchGrid grid;
   ResidentPatches resident;
 
-  using Found = std::map<TerrainPatch, std::shared_ptr<const PatchHeights>>;
+  using Found = std::unordered_map<TerrainPatch, std::shared_ptr<const PatchHeights>, PatchHash>;
 
-  /// Looks patches up once, so that the answers do not change while a selection is formed.
+  /// Looks patches up. Those that were found stay found while a selection is formed.
   std::shared_ptr<const PatchHeights> find(const TerrainPatch& patch, Found& found) const {
     const auto known = found.find(patch);
     if (known != found.end()) return known->second;
-    return found[patch] = resident.find(patch);
+    std::shared_ptr<const PatchHeights> heights = resident.find(patch);
+    // In this selection, a patch that is read now is found by a later look.
+    if (heights) found.emplace(patch, heights);
+    return heights;
   }
 
   /// Demands the finer patches of coarser neighbours that take too much of the error.
@@ -81,7 +84,7 @@ TerrainSelection TerrainDetail::select(const Camera& camera, double pixelError, 
     const std::vector<TerrainPatch> needed = cut.needed();
     if (reading == Reading::Now) {
       resident.load(needed);
-      found.clear();
+      if (needed.size() >= resident.capacity()) found.clear();  // some were dropped for others
     } else {
       resident.request(needed);
     }

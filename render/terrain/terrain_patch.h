@@ -4,6 +4,7 @@
 
 #include <array>
 #include <compare>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -15,6 +16,17 @@ namespace render {
 struct TerrainPatch {
   int level = 0, column = 0, row = 0;
   auto operator<=>(const TerrainPatch&) const = default;
+};
+
+/// Hash of a patch for tables.
+struct PatchHash {
+  std::size_t operator()(const TerrainPatch& patch) const {
+    const auto bits = [](int n) { return static_cast<std::uint64_t>(static_cast<unsigned>(n)); };
+    // Golden ratios spread neighbours over the table.
+    std::uint64_t hash = (bits(patch.column) << 32 | bits(patch.row)) * 0x9E3779B97F4A7C15ull;
+    hash = (hash ^ hash >> 29) + bits(patch.level);
+    return static_cast<std::size_t>(hash * 0xBF58476D1CE4E5B9ull >> 7);
+  }
 };
 
 /// Sides of a patch as bits of a set.

@@ -26,15 +26,16 @@ inline double noiseAt(std::uint32_t column, std::uint32_t row, std::uint32_t see
 }
 
 /// Ground by midpoint displacement: new samples of a stride s are the mean of two or four samples,
-/// plus noise of the size roughness × s. The size is 2^power + 1 samples.
+/// plus noise of the size roughness × s^smoothness. With smoothness 1, all scales are as rough.
+/// Real grounds have about 0.8. The size is 2^power + 1 samples.
 template <typename ForRows>
 levelset::HeightField fractalTerrain(int power, double roughness, std::uint32_t seed,
-                                     const ForRows& forRows) {
+                                     const ForRows& forRows, double smoothness = 1) {
   const int last = 1 << power;
   levelset::HeightField field{.columns = last + 1, .rows = last + 1};
   field.heights.assign(static_cast<std::size_t>(last + 1) * static_cast<std::size_t>(last + 1), 0);
   for (int stride = last / 2; stride > 0; stride /= 2) {
-    const double size = roughness * stride;
+    const double size = roughness * std::pow(stride, smoothness);
     const auto row = [&](int n) {
       const int j = n * stride, down = j % (2 * stride);
       for (int i = down == 0 ? stride : 0; i <= last; i += down == 0 ? 2 * stride : stride) {
