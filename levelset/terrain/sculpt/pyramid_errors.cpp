@@ -48,7 +48,10 @@ void include(PyramidPatch& patch, float lowest, float highest) {
 
 PyramidErrors::PyramidErrors(const HeightField& field, const PyramidOptions& options) {
   requireHeights(field);
-  pyramid_ = unmeasuredPyramid(field.columns, field.rows, options.cells, options.maxMemory);
+  requirePyramid(field.columns, field.rows, options.cells);
+  requireMemory(sizeof(PyramidPatch) * patchCount(field.columns, field.rows, options.cells),
+                memoryLeft(memoryLimit(options.maxMemory)));
+  pyramid_ = emptyPyramid(field.columns, field.rows, options.cells);
   const SampleRange all{.lastColumn = field.columns - 1, .lastRow = field.rows - 1};
   cells_.resize(pyramid_.levels.size());
   for (std::size_t level = 1; level < cells_.size(); ++level) {
