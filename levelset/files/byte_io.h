@@ -12,8 +12,8 @@
 #include "levelset/file_target.h"
 #include "levelset/progress.h"
 
-// Private to levelset/files, mesh_files, point_files and volume_files: reads and writes complete
-// files in memory, with or without gzip compression.
+// Private to levelset/files, mesh_files, point_files, volume_files and terrain: reads and writes
+// complete files in memory, with or without gzip compression.
 
 namespace levelset {
 

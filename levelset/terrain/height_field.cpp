@@ -15,16 +15,6 @@ namespace {
 
 constexpr int kMostSamples = 1 << 30;
 
-/// Range of samples of an axis in an interval, first and last; none if first > last.
-std::pair<int, int> samplesIn(double origin, double spacing, int count, double low, double high) {
-  // A border within 1e-9 of a sample counts as the sample, since decimal numbers are rounded.
-  constexpr double kNear = 1e-9;
-  const double first = std::ceil((low - origin) / spacing - kNear),
-               last = std::floor((high - origin) / spacing + kNear);
-  return {static_cast<int>(std::clamp(first, 0.0, static_cast<double>(count))),
-          static_cast<int>(std::clamp(last, -1.0, static_cast<double>(count) - 1))};
-}
-
 }  // namespace
 
 std::size_t HeightField::missingCount() const {
@@ -140,11 +130,21 @@ HeightField heightsOf(const Volume& volume, std::optional<double> noData, std::s
   return field;
 }
 
+std::pair<int, int> samplesBetween(double origin, double spacing, int count, double low,
+                                   double high) {
+  // A border within 1e-9 of a sample counts as the sample, since decimal numbers are rounded.
+  constexpr double kNear = 1e-9;
+  const double first = std::ceil((low - origin) / spacing - kNear),
+               last = std::floor((high - origin) / spacing + kNear);
+  return {static_cast<int>(std::clamp(first, 0.0, static_cast<double>(count))),
+          static_cast<int>(std::clamp(last, -1.0, static_cast<double>(count) - 1))};
+}
+
 HeightField croppedHeights(const HeightField& field, const Imath::Box3d& box) {
   const auto [firstColumn, lastColumn] =
-      samplesIn(field.origin.x, field.spacing.x, field.columns, box.min.x, box.max.x);
+      samplesBetween(field.origin.x, field.spacing.x, field.columns, box.min.x, box.max.x);
   const auto [firstRow, lastRow] =
-      samplesIn(field.origin.y, field.spacing.y, field.rows, box.min.y, box.max.y);
+      samplesBetween(field.origin.y, field.spacing.y, field.rows, box.min.y, box.max.y);
   if (firstColumn > lastColumn || firstRow > lastRow) {
     const Imath::V2d end = field.position(field.columns - 1, field.rows - 1);
     throw InvalidInput(fmt::format(

@@ -9,6 +9,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "levelset/progress.h"
@@ -72,6 +73,12 @@ void requireLengths(const HeightField& field);
 /// @throws ResourceLimit
 [[nodiscard]] HeightField heightsOf(const Volume& volume, std::optional<double> noData = {},
                                     std::size_t maxMemory = kNoMemoryLimit);
+
+/// Range of the samples of an axis in an interval: the first and the last. None: first > last.
+/// Borders within 1e-9 spacings of a sample contain it.
+/// @param origin  position of the first sample
+[[nodiscard]] std::pair<int, int> samplesBetween(double origin, double spacing, int count,
+                                                 double low, double high);
 
 /// Keeps the samples in a box of positions, borders included. The height of the box does not count.
 /// @throws InvalidInput when the box has no sample
