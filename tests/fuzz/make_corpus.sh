@@ -6,7 +6,7 @@ levelsmith="$1 --quiet --threads 1"
 cd "$(dirname "$0")/corpus"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-mkdir -p ply obj stl off gzip points_vdb vdb nvdb png exr patch scene graph cache
+mkdir -p ply obj stl off gzip points_vdb vdb nvdb png exr patch scene graph cache tiles
 
 # Inside one octant, so that the file has one inner node of a few kB.
 solid="box --size 1,1,1 --center 2,2,2 --voxel 0.5 --as a"
@@ -27,6 +27,10 @@ $levelsmith $solid ! sphere --radius 0.5 --voxel 0.25 --as b ! scene @a @b --csg
 sed 's/"scene-a.vdb"/"ball.vdb"/; s/"scene-b.vdb"/"ball.vdb"/' "$work/scene.json" >scene/difference.json
 $levelsmith --save-graph graph/chain.json --dry-run $solid ! sphere --radius 0.5 --voxel 0.5 ! difference @a ! \
   offset 1vx --mask "x > 0" ! render a.exr --size 4x3 ! measure >/dev/null
+printf 'ncols 9\nnrows 6\nxllcorner 0\nyllcorner 0\ncellsize 1\nNODATA_value -1\n' >"$work/ground.asc"
+awk 'BEGIN { for (n = 0; n < 54; ++n) printf "%g ", n % 11 == 3 ? -1 : (n * n % 37) / 4 }' >>"$work/ground.asc"
+$levelsmith read "$work/ground.asc" ! write tiles/quarters.lst --cells 4 ! write tiles/tolerance.lst --cells 2 --tolerance 0.3 ! \
+  terrain --scale 0.31830989 ! write tiles/floats.lst
 $levelsmith --cache "$work/cache" box --size 1,1,1 --voxel 0.5 ! mesh ! measure >/dev/null
 for entry in "$work"/cache/results/*.json; do
   target=cache/$(sed -n 's/.*"action": "\([a-z]*\)".*/\1/p' "$entry")

@@ -17,6 +17,7 @@ case $reader in
   vdb|nvdb|points_vdb) words=vdb ;;
   png|exr) words=picture ;;
   asc|bil) words=grid ;;
+  tiles) words=tiles ;;
   graph) words="json actions" ;;
   patch|lattice|bezier|quadrics|scene|cache) words=json ;;
   script|chain) words="script actions" ;;

@@ -2,7 +2,7 @@
 # program is built by a test before them, as the consumer is: by another compiler, from modules of this build.
 # `./dev test` builds it earlier, so that its time counts to the build.
 set(fuzz_readers
-  ply obj stl off points points_ply points_obj points_vdb gzip vdb nvdb nifti metaimage nrrd mrc asc bil png exr heights
+  ply obj stl off points points_ply points_obj points_vdb gzip vdb nvdb nifti metaimage nrrd mrc asc bil tiles png exr heights
   patch lattice bezier quadrics pdb cif scene cache graph script chain formula)
 set(fuzz_program ${PROJECT_SOURCE_DIR}/build/fuzz/tests/fuzz/levelsmith_fuzz)
 add_test(NAME fuzz.build COMMAND ${CMAKE_CURRENT_LIST_DIR}/build.sh ${PROJECT_BINARY_DIR})

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "levelset/terrain/files/height_field_file.h"
+#include "levelset/terrain/tiles/tiled_ground.h"
 #include "levelset/volume_files/volume_file.h"
 #include "tests/fuzz/readers.h"
 
@@ -59,13 +60,31 @@ void readBil(std::string_view bytes) {
   readTerrainFile(scratchFile("some.bil", heights));
   readTerrainFile(scratchFile("some.flt", heights));
 }
+/// Reads the header, the index and the first patches of each level. A fuzzer ignores checksums.
+void readTiles(std::string_view bytes) {
+  const std::filesystem::path file = scratchFile("some.lst", bytes);
+  accepts([&] { static_cast<void>(levelset::tiledGroundHash(file)); });
+  accepts([&] {
+    const auto tiles = levelset::openTiledGround(file, kMaxMemory);
+    const levelset::HeightPyramid& pyramid = tiles->layout().pyramid;
+    std::vector<float> heights(static_cast<std::size_t>((pyramid.cells + 1) * (pyramid.cells + 1)));
+    for (std::size_t n = 0; n < pyramid.levels.size(); ++n)
+      for (int patch = 0; patch < std::min(pyramid.levels[n].columns, 8); ++patch)
+        accepts([&] {
+          tiles->readPatch(static_cast<int>(n), patch, 0, heights);
+          for (const float height : heights)
+            require(!std::isinf(height), "heights are finite or missing");
+        });
+  });
+}
 
 }  // namespace
 
 std::vector<Reader> volumeReaders() {
   return {{"nifti", readNifti}, {"metaimage", readMetaImage},
           {"nrrd", readNrrd},   {"mrc", readMrc},
-          {"asc", readAsc},     {"bil", readBil}};
+          {"asc", readAsc},     {"bil", readBil},
+          {"tiles", readTiles}};
 }
 
 }  // namespace fuzz
