@@ -61,6 +61,7 @@ std::vector<Operator> allOperators() {
       sculptOperator(),
       hillshadeOperator(),
       contoursOperator(),
+      tileTerrainOperator(),
       solidifyOperator(),
       unionWithSegmentations(unionOperator()),
       intersectionOperator(),

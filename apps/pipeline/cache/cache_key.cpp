@@ -14,6 +14,7 @@
 #include "levelset/files/band_file.h"
 #include "levelset/segmented/files/segmented_file.h"
 #include "levelset/terrain/files/height_field_file.h"
+#include "levelset/terrain/tiles/tiled_ground.h"
 
 namespace pipeline {
 namespace {
@@ -77,6 +78,15 @@ void addTerrainFiles(std::string& text, const std::filesystem::path& file, const
     add(text, ending, digestOfFile(file.string() + ending).value_or(""));
 }
 
+/// Content of a tiled terrain, from its header: the file may be larger than the memory.
+std::optional<std::string> contentOfTiles(const std::filesystem::path& file) {
+  try {
+    return fmt::format("tiles {:016x}", levelset::tiledGroundHash(file));
+  } catch (const levelset::Error&) {
+    return {};  // not cached: the action that reads the file will report the error
+  }
+}
+
 }  // namespace
 
 CacheKeys::CacheKeys(const Cache& cache, std::size_t maxMemory)
@@ -97,6 +107,9 @@ std::optional<std::string> CacheKeys::contentOf(const std::filesystem::path& fil
   const std::string extension = lowerExtension(file);
   // Not cached: the file is no regular file, or one that refers to further files.
   if (!stamp || refersToFiles(extension)) return {};
+  const auto format = node.options.find("format");
+  if (levelset::isTiledGroundFormat(format == node.options.end() ? file.string() : format->second))
+    return contentOfTiles(file);
   std::string about = stampText(*stamp);
   const auto grid = node.options.find("grid");
   const bool isNamed = extension == ".vdb" && grid != node.options.end();

@@ -54,6 +54,7 @@ namespace pipeline {
 [[nodiscard]] Operator sculptOperator();
 [[nodiscard]] Operator hillshadeOperator();
 [[nodiscard]] Operator contoursOperator();
+[[nodiscard]] Operator tileTerrainOperator();
 [[nodiscard]] Operator solidifyOperator();
 /// The action `surface-band`, for open meshes and terrains.
 [[nodiscard]] Operator surfaceBandOperator();

@@ -5,6 +5,7 @@
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
+#include "apps/pipeline/operators/tiled_terrain.h"
 #include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "apps/pipeline/values/terrain_picture.h"
@@ -18,6 +19,7 @@
 #include "levelset/segmented/files/segmented_file.h"
 #include "levelset/segmented/files/segmented_mesh_file.h"
 #include "levelset/terrain/files/height_field_file.h"
+#include "levelset/terrain/tiles/tiled_ground.h"
 #include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
 
@@ -67,11 +69,12 @@ Kind fileKind(const Invocation& in) {
   if (render::isSceneFormat(name)) return Kind::Scene;
   if (isRead && levelset::isVolumeFormat(name)) return Kind::Volume;
   if (isRead && levelset::holdsMolecule(name)) return Kind::Molecule;
-  if (levelset::isAsciiGridFormat(name)) return Kind::Terrain;
+  if (levelset::isAsciiGridFormat(name) || levelset::isTiledGroundFormat(name))
+    return Kind::Terrain;
   if (isRead && (levelset::isHeightFormat(name) || isTerrainPicture(name))) return Kind::Terrain;
   throw UsageError(
       fmt::format("{}: '{}' is of no known format; use ply, obj, stl, off, xyz, csv or pts (also "
-                  ".gz), vdb{}, asc, patch or "
+                  ".gz), vdb{}, asc, lst, patch or "
                   "json",
                   in.op().name, name,
                   isRead ? ", nii, mha, nrrd, mrc, raw, pdb, cif, hgt, flt, bil, png" : ", nvdb"));
@@ -135,6 +138,7 @@ Value read(Invocation& in) {
                                       .maxMemory = in.maxMemory,
                                       .notes = &in.notes.notes,
                                       .progress = in.progress}));
+  if (levelset::isTiledGroundFormat(formatName(in))) return readTiledTerrain(in);
   if (kind == Kind::Terrain)
     return Value(isTerrainPicture(formatName(in))
                      ? readTerrainPicture(file, in.maxMemory)
@@ -199,6 +203,7 @@ Plan planRead(Invocation& in) {
     plan.kind = Kind::Segmentation;
     return plan;
   }
+  if (levelset::isTiledGroundFormat(formatName(in))) return planTiledTerrain(in);
   if (kind != Kind::Band) return read(in).plan();
   for (const levelset::GridInfo& grid : levelset::bandFileInfo(in.text("file"))) {
     if (in.given("grid") ? grid.name != in.text("grid") : !grid.isLevelSet) continue;
@@ -225,6 +230,7 @@ Plan planRead(Invocation& in) {
 void validateRead(const Invocation& in) {
   const Kind kind = fileKind(in);
   checkVolumeOptions(in, kind == Kind::Volume);
+  checkTiledOptions(in, tiledReadParams(), levelset::isTiledGroundFormat(formatName(in)));
   if (kind != Kind::Mesh && kind != Kind::Points && in.flag("no-attributes"))
     throw UsageError(
         fmt::format("read: --no-attributes is for meshes and point clouds, and this is a {}; leave "
@@ -269,12 +275,13 @@ void validateWrite(const Invocation& in) {
         : held == Kind::Adaptive     ? "put 'mesh' or 'to-band' before it"
         : held == Kind::Segmentation ? "write .vdb, .ply or .obj, or put 'extract LABEL' before it"
         : held == Kind::Molecule     ? "put 'molecule-surface' before it"
-        : held == Kind::Terrain      ? "write .asc, or put 'mesh' before it"
+        : held == Kind::Terrain      ? "write .asc or .lst, or put 'mesh' before it"
         : held == Kind::Deformation  ? "write .json"
         : held == Kind::Points       ? "write .ply, .obj, .xyz, .csv, .pts or .vdb"
         : kind == Kind::Points       ? "put 'sample' before it, or write .ply"
                                      : "put 'level-set' before it, or write .ply"));
   }
+  checkTiledOptions(in, tiledWriteParams(), levelset::isTiledGroundFormat(formatName(in)));
   if (held == Kind::Segmentation && in.given("name"))
     throw UsageError(
         "write: --name is the name of the grid of a level set, but the grids of a segmentation "
@@ -306,6 +313,8 @@ Value write(Invocation& in) {
     levelset::writeLattice(file, *lattice);
   } else if (value.kind() == Kind::Scene) {
     render::writeScene(file, value.scene(), in.progress);
+  } else if (levelset::isTiledGroundFormat(formatName(in))) {
+    levelset::writeTiledGround(file, value.terrain(), tiledWriteOptions(in));
   } else if (value.kind() == Kind::Terrain) {
     levelset::writeHeightField(file, value.terrain(), {.progress = in.progress});
     if (value.terrain().isGeographic)
@@ -372,7 +381,7 @@ Operator readOperator() {
           "vdb. Volumes are nii, hdr, mha, mhd, nrrd, nhdr, mrc, map or raw. Points are xyz, csv "
           "or "
           "pts, ply or obj without faces, or a vdb with a grid of points. Patches are patch, and "
-          "scenes json. Molecules are pdb or cif, and terrains asc, hgt, flt, bil or png. "
+          "scenes json. Molecules are pdb or cif, and terrains asc, hgt, flt, bil, lst or png. "
           "A .vdb with more than one level set needs --grid. A grid that is not a level set needs "
           "--grid, too; it becomes a field of numbers or of vectors, which may be staggered. "
           "Meshes keep the normals, texture coordinates and colours of their vertices in PLY and "
@@ -386,7 +395,8 @@ Operator readOperator() {
           "The json file of a Bézier volume is a scene, too. A json file of a lattice is a "
           "deformation. "
           "A terrain has heights of a ground; those of a grey png are from 0 (black) to 1 (white). "
-          "Transparent pixels are missing. "
+          "Transparent pixels are missing. Of a tiled terrain (lst), --box and --level read a "
+          "part. "
           "Of a molecule, the first model is read, without water. Of alternate locations of an "
           "atom "
           "the one with the largest occupancy counts. "
@@ -400,7 +410,7 @@ Operator readOperator() {
                  {.name = "format",
                   .type = ParamType::Text,
                   .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nii, mha, "
-                         "nrrd, mrc, raw, patch, json, pdb, cif, asc, hgt, flt, bil or png; "
+                         "nrrd, mrc, raw, patch, json, pdb, cif, asc, hgt, flt, bil, lst or png; "
                          "default: by its extension"},
                  {.name = "grid",
                   .type = ParamType::Text,
@@ -431,11 +441,12 @@ Operator readOperator() {
       .usesStandardInput = isStandardStream,
   };
   for (Param& param : volumeFileParams()) op.params.push_back(std::move(param));
+  for (Param& param : tiledReadParams()) op.params.push_back(std::move(param));
   return op;
 }
 
 Operator writeOperator() {
-  return {
+  Operator op{
       .name = "write",
       .group = "Files",
       .summary =
@@ -445,8 +456,8 @@ Operator writeOperator() {
           "Meshes go to ply, obj, stl or off, also with .gz. Level sets and fields go to vdb or "
           "nvdb, "
           "and points to ply, obj, xyz, csv or pts, also with .gz, or to vdb. Patches go to patch, "
-          "scenes and lattices to json, and terrains to asc. Segmentations go to vdb, or to ply or "
-          "obj with the "
+          "scenes and lattices to json, and terrains to asc or lst. Segmentations go to vdb, or to "
+          "ply or obj with the "
           "labels on both sides of each face. "
           "Data is written to a temporary file in the same folder, which replaces an existing file "
           "only when it is complete. The level sets and meshes of a scene go to .vdb and .ply "
@@ -464,8 +475,9 @@ Operator writeOperator() {
             .position = 0},
            {.name = "format",
             .type = ParamType::Text,
-            .doc = "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nvdb, asc, patch "
-                   "or json; default: by its extension"},
+            .doc =
+                "format of the file: ply, obj, stl, off, xyz, csv, pts, vdb, nvdb, asc, lst, patch "
+                "or json; default: by its extension"},
            {.name = "name",
             .type = ParamType::Text,
             .doc =
@@ -483,6 +495,8 @@ Operator writeOperator() {
       .usesStandardOutput =
           [](const Invocation& in) { return levelset::isStandardOutput(in.text("file")); },
   };
+  for (Param& param : tiledWriteParams()) op.params.push_back(std::move(param));
+  return op;
 }
 
 }  // namespace pipeline

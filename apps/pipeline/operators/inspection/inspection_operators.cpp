@@ -12,6 +12,7 @@
 #include "apps/pipeline/operators/solids/deformation_options.h"
 #include "apps/pipeline/operators/solids/segment_actions.h"
 #include "apps/pipeline/operators/terrain/terrain_figures.h"
+#include "apps/pipeline/operators/tiled_terrain.h"
 #include "apps/pipeline/operators/volume_params.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/adaptive/adaptive_to_mesh.h"
@@ -27,6 +28,7 @@
 #include "levelset/point_files/point_file.h"
 #include "levelset/points/processing/point_spacing.h"
 #include "levelset/terrain/files/height_field_file.h"
+#include "levelset/terrain/tiles/tiled_ground.h"
 #include "levelset/volume_files/volume_file.h"
 
 namespace pipeline {
@@ -230,11 +232,13 @@ void validateInfo(const Invocation& in) {
   if (levelset::isMeshFormat(name) || levelset::isPointFormat(name)) return;
   if (levelset::isBandFormat(name) && !name.ends_with("nvdb")) return;
   if (levelset::isVolumeFormat(name) && !levelset::isRawFormat(name)) return;
-  if (levelset::holdsMolecule(name) || levelset::isHeightFormat(name)) return;
+  if (levelset::holdsMolecule(name) || levelset::isHeightFormat(name) ||
+      levelset::isTiledGroundFormat(name))
+    return;
   throw levelset::UsageError(
       fmt::format("info: '{}' is of no known format; info reads ply, obj, stl, off, xyz, csv, pts "
                   "(also .gz), vdb, "
-                  "nii, mha, nrrd, mrc, pdb, cif, asc, hgt, flt and bil",
+                  "nii, mha, nrrd, mrc, pdb, cif, asc, hgt, flt, bil and lst",
                   name));
 }
 
@@ -244,6 +248,10 @@ Json fileInfo(const std::string& file, const std::string& format, std::size_t ma
   const std::string name = format.empty() ? file : format;
   if (levelset::holdsMolecule(name)) {
     addMolecule(json, levelset::readMolecule(file, {.format = format, .solvent = true}));
+    return json;
+  }
+  if (levelset::isTiledGroundFormat(name)) {
+    addTiledTerrain(json, file, maxMemory);
     return json;
   }
   if (levelset::isHeightFormat(name)) {

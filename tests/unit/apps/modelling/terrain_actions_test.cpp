@@ -315,7 +315,7 @@ TEST_F(TerrainActions, WriteKeepsWhatTheFormatHolds) {
   ASSERT_EQ(levelsmith("read hole.asc ! write again.asc").code, 0);
   EXPECT_EQ(json("read again.asc ! info --json")["hash"],
             json("read hole.asc ! info --json")["hash"]);
-  expectRefusal("read plane.asc ! write a.ply", 2, "write .asc, or put 'mesh' before it");
+  expectRefusal("read plane.asc ! write a.ply", 2, "write .asc or .lst, or put 'mesh' before it");
   expectRefusal("sphere --radius 1 --voxel 0.2 ! write a.asc", 2, "a level set cannot be written");
   expectRefusal("read plane.asc ! write a.hgt", 2, "no known format");
   writeFile("plane.prj", "PROJCS[\"UTM 32\"]");
