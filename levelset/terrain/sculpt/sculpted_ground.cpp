@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "levelset/terrain/sculpt/pyramid_errors.h"
+#include "levelset/terrain/sculpt/followed_pyramid.h"
 
 namespace levelset {
 namespace terrain {
@@ -102,7 +102,7 @@ struct SculptedGround::State {
   HeightField field;
   GroundChanges changes;
   std::size_t undoMemory, maxMemory;
-  std::unique_ptr<terrain::PyramidErrors> errors;
+  std::unique_ptr<terrain::FollowedPyramid> errors;
   std::deque<terrain::Stroke> done;
   std::vector<terrain::Stroke> undone;  // the last one is redone first
   std::size_t undoBytes = 0;            // of the strokes that are done
@@ -116,7 +116,7 @@ SculptedGround::SculptedGround(HeightField field, const SculptOptions& options) 
     applyEdits(state_->field, *options.edits);
     state_->changes.add(*options.edits);
   }
-  state_->errors = std::make_unique<terrain::PyramidErrors>(
+  state_->errors = std::make_unique<terrain::FollowedPyramid>(
       state_->field,
       PyramidOptions{
           .cells = options.cells, .maxMemory = options.maxMemory, .progress = options.progress});

@@ -12,10 +12,10 @@ namespace levelset::terrain {
 /// A pyramid of a ground that changes, with the errors of all coarse cells. They let an update
 /// measure again only the cells below the change. They take 4/3 bytes for each sample, and at
 /// most 4 for narrow fields.
-class PyramidErrors {
+class FollowedPyramid {
  public:
   /// @throws as heightPyramid()
-  PyramidErrors(const HeightField& field, const PyramidOptions& options);
+  FollowedPyramid(const HeightField& field, const PyramidOptions& options);
 
   /// Equals heightPyramid() of the field to the bit.
   [[nodiscard]] const HeightPyramid& pyramid() const { return pyramid_; }

@@ -1,4 +1,4 @@
-#include "levelset/terrain/sculpt/pyramid_errors.h"
+#include "levelset/terrain/sculpt/followed_pyramid.h"
 
 #include <tbb/blocked_range2d.h>
 #include <tbb/parallel_for.h>
@@ -46,7 +46,7 @@ void include(PyramidPatch& patch, float lowest, float highest) {
 
 }  // namespace
 
-PyramidErrors::PyramidErrors(const HeightField& field, const PyramidOptions& options) {
+FollowedPyramid::FollowedPyramid(const HeightField& field, const PyramidOptions& options) {
   requireHeights(field);
   requirePyramid(field.columns, field.rows, options.cells);
   requireMemory(sizeof(PyramidPatch) * patchCount(field.columns, field.rows, options.cells),
@@ -74,7 +74,7 @@ PyramidErrors::PyramidErrors(const HeightField& field, const PyramidOptions& opt
   }
 }
 
-void PyramidErrors::update(const HeightField& field, const SampleRange& changed) {
+void FollowedPyramid::update(const HeightField& field, const SampleRange& changed) {
   if (changed.isEmpty()) return;
   int patchShift = 0;
   while ((1 << patchShift) < pyramid_.cells) ++patchShift;
@@ -89,8 +89,8 @@ void PyramidErrors::update(const HeightField& field, const SampleRange& changed)
   }
 }
 
-void PyramidErrors::measureCells(const HeightField& field, std::size_t level,
-                                 const SampleRange& range) {
+void FollowedPyramid::measureCells(const HeightField& field, std::size_t level,
+                                   const SampleRange& range) {
   CellLevel& cells = cells_[level];
   const auto last = [&](int square, int samples) {
     return static_cast<int>(
@@ -106,8 +106,8 @@ void PyramidErrors::measureCells(const HeightField& field, std::size_t level,
   });
 }
 
-void PyramidErrors::measurePatches(const HeightField& field, std::size_t level,
-                                   const SampleRange& range) {
+void FollowedPyramid::measurePatches(const HeightField& field, std::size_t level,
+                                     const SampleRange& range) {
   PyramidLevel& patches = pyramid_.levels[level];
   const int side = pyramid_.cells;
   forEachSquare(range, 1, [&](int column, int row) {
