@@ -41,7 +41,8 @@ double gradientNoise(const V3d& p) {
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const int i = corner & 1, j = corner >> 1 & 1, k = corner >> 2;
-    const double weight = (i ? fadeCurve(d.x) : 1 - fadeCurve(d.x)) * (j ? fadeCurve(d.y) : 1 - fadeCurve(d.y)) *
+    const double weight = (i ? fadeCurve(d.x) : 1 - fadeCurve(d.x)) *
+                          (j ? fadeCurve(d.y) : 1 - fadeCurve(d.y)) *
                           (k ? fadeCurve(d.z) : 1 - fadeCurve(d.z));
     sum += weight * gradientPart(latticeHash(x + i, y + j, z + k), d - V3d(i, j, k));
   }

@@ -27,8 +27,8 @@ class GpuTerrains {
   /// Frees all objects in the context. Runs in a job of GlContext::run().
   void release();
 
-  /// First hits of rays. The tables of a terrain are uploaded by the first call, and stay as long as
-  /// something else holds them.
+  /// First hits of rays. The tables of a terrain are uploaded by the first call, and stay as long
+  /// as something else holds them.
   /// @throws levelset::ResourceLimit for a terrain that does not fit into buffer textures
   [[nodiscard]] std::vector<TerrainHit> firstHits(const TerrainCaster& caster,
                                                   const std::vector<Camera::Ray>& rays);
