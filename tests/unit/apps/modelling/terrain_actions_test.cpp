@@ -236,7 +236,8 @@ TEST_F(TerrainActions, MeshAndRenderShowTheGround) {
   expectRefusal("sphere --radius 1 --voxel 0.2 ! render a.png --facets", 2,
                 "--facets is for terrains");
   expectRefusal("read plane.asc ! render a.png --outside '0,0,1 8,4,2'", 3, "beyond the heights");
-  expectRefusal("read plane.asc ! terrain --crop '0,0,0 0,9,9' ! render a.png", 3, "at least 2x2");
+  expectRefusal("read plane.asc ! terrain --crop '-1,-1,0 1,9,9' ! render a.png", 3,
+                "at least 2x2");
 }
 
 TEST_F(TerrainActions, SceneReplacesGroundByASolid) {
