@@ -62,6 +62,7 @@ std::vector<Operator> allOperators() {
       hillshadeOperator(),
       contoursOperator(),
       tileTerrainOperator(),
+      terrainMeshOperator(),
       solidifyOperator(),
       unionWithSegmentations(unionOperator()),
       intersectionOperator(),

@@ -55,6 +55,7 @@ namespace pipeline {
 [[nodiscard]] Operator hillshadeOperator();
 [[nodiscard]] Operator contoursOperator();
 [[nodiscard]] Operator tileTerrainOperator();
+[[nodiscard]] Operator terrainMeshOperator();
 [[nodiscard]] Operator solidifyOperator();
 /// The action `surface-band`, for open meshes and terrains.
 [[nodiscard]] Operator surfaceBandOperator();

@@ -47,6 +47,18 @@ TEST_F(TerrainActions, ReadDescribesATerrain) {
   EXPECT_EQ(json("read - --format asc <plane.asc ! info --json")["missing"], 0);
 }
 
+TEST_F(TerrainActions, TerrainMeshHasTheTrianglesOfAPicture) {
+  // A plane needs one patch, whose triangles are those of the samples.
+  const Json all = json("read plane.asc ! terrain-mesh --from 4,-9,9 ! info --json");
+  EXPECT_EQ(all["kind"], "mesh");
+  EXPECT_EQ(all["triangles"], 16);
+  // Triangles with a missing corner are left out.
+  EXPECT_EQ(json("read hole.asc ! terrain-mesh --from 4,-9,9 ! info --json")["triangles"], 10);
+  expectRefusal("read plane.asc ! terrain-mesh --from 4,-9,9 --to 4,-20,9", 3, "shows no ground");
+  expectRefusal("read plane.asc ! terrain-mesh --pixel-error 0", 2, "--pixel-error");
+  expectRefusal("read plane.asc ! terrain-mesh --to 1,2,3", 2, "--from");
+}
+
 TEST_F(TerrainActions, TerrainPlacesAndFills) {
   const Json info =
       json("read hole.asc ! terrain --spacing 4,3 --origin 10,-20 --scale 2 --fill ! info --json");
