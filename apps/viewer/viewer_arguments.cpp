@@ -369,8 +369,8 @@ void requireFit(const Arguments& arguments, const Model& model) {
 
 render::Camera firstCamera(const Arguments& arguments, const Model& model, int width, int height) {
   render::Camera camera;
-  // In the coordinates of medical images, z points to the head.
-  if (model.volume) camera.up = Imath::V3d(0, 0, 1);
+  // In the coordinates of medical images, z points to the head; in terrains, upwards.
+  if (model.volume || model.terrain) camera.up = Imath::V3d(0, 0, 1);
   const Imath::Box3d nothing(Imath::V3d(-1), Imath::V3d(1));
   const Imath::Box3d& bounds = model.bounds.isEmpty() ? nothing : model.bounds;
   if (model.camera && !arguments.from) {
@@ -389,7 +389,8 @@ render::Camera firstCamera(const Arguments& arguments, const Model& model, int w
     const double fov = arguments.verticalFov.value_or(camera.verticalFov);
     const Imath::V3d up = arguments.up.value_or(camera.up);
     // The particles of patches are not in the scene, and isosurfaces of volumes change.
-    const bool isFramedByBox = model.bounds.isEmpty() || !model.patches.empty() || model.volume;
+    const bool isFramedByBox =
+        model.bounds.isEmpty() || !model.patches.empty() || model.volume || model.terrain;
     camera = isFramedByBox ? render::framingCamera(bounds, width, height, fov, up)
                            : render::framingCamera(model.scene, width, height, fov, up);
   }

@@ -10,6 +10,7 @@
 #include "apps/viewer/model/matcap_ball.h"
 #include "apps/viewer/model/surface_discs.h"
 #include "apps/viewer/volume/volume_slices.h"
+#include "levelset/error.h"
 #include "levelset/memory/memory_limit.h"
 #include "render/cpu/cpu_tracer.h"
 #include "render/gpu/device/gl_context.h"
@@ -77,6 +78,12 @@ struct ProgressivePicture::Worker {
   std::shared_ptr<const Model> discsModel;
   std::vector<SurfaceDiscs> discs;
   std::string name = "processor";
+
+  // Pictures of the terrain of terrainModel. They are drawn again while patches arrive.
+  std::shared_ptr<const Model> terrainModel;
+  std::unique_ptr<TerrainFrames> terrainFrames;
+  std::string terrainNote;
+  bool isTerrainFinal = true;
 
   explicit Worker(const ProgressivePicture& owner_) : owner(owner_) {}
 
@@ -146,6 +153,28 @@ struct ProgressivePicture::Worker {
         discs, scene, view.model->extent(), optionsFor({kSplatPixelSize, 1, 0, 0}), isStale);
     if (drawn) render::addViewAttributes(*drawn, scene, view.model->extent());
     return drawn;
+  }
+
+  /// Draws the terrain of the model. Its pictures have full resolution at once.
+  void drawTerrain() {
+    if (display.layer >= Layer::MeanCurvature && display.layer <= Layer::K2)
+      throw levelset::UsageError("a terrain has no curvature layers; choose another layer");
+    if (view.hasThickness || display.layer == Layer::Thickness)
+      throw levelset::UsageError("a terrain has no thickness; choose another layer");
+    if (terrainModel != view.model) {
+      terrainFrames = nullptr;
+      terrainFrames = std::make_unique<TerrainFrames>(*view.model->terrain);
+      terrainModel = view.model;
+      isTerrainFinal = true;
+    }
+    if (!isTerrainFinal) terrainFrames->waitForPatch();
+    const TerrainFrames::Drawn drawn = terrainFrames->draw(view.camera);
+    image = drawn.image;
+    terrainNote = drawn.note;
+    isTerrainFinal = drawn.isFinal;
+    pixelSize = 1;
+    pass = drawn.isFinal ? kPasses.size() : 0;
+    name = "OpenGL";
   }
 
   [[nodiscard]] render::RenderOptions optionsFor(const Pass& how) const {
@@ -259,6 +288,7 @@ struct ProgressivePicture::Worker {
     frame->isComplete = pass == kPasses.size();
     frame->image = image;
     Canvas& canvas = frame->canvas;
+    frame->note = view.model->terrain ? terrainNote : "";
     const render::Image* seen = image.get();
     EffectPicture effected;
     if (display.layer == Layer::Colour && !display.effects.isEmpty()) {
@@ -351,7 +381,10 @@ void ProgressivePicture::run() {
     std::shared_ptr<const Frame> frame;
     std::exception_ptr failure;
     try {
-      if (isRecoloured) {
+      if (worker.view.model->terrain) {
+        worker.drawTerrain();
+        frame = worker.shown();
+      } else if (isRecoloured) {
         frame = worker.shown();
       } else if (worker.wantsSplats()) {
         if (auto drawn = worker.splatted(isStale_)) {

@@ -12,6 +12,7 @@
 #include "levelset/files/band_file.h"
 #include "levelset/mesh.h"
 #include "levelset/mesh_files/mesh_file.h"
+#include "levelset/terrain/files/height_field_file.h"
 #include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
 #include "render/views/scene_file.h"
@@ -23,9 +24,10 @@ namespace fs = std::filesystem;
 using levelset::UsageError;
 
 constexpr const char* kFormats =
-    "vdb, nii, mha, mhd, nrrd, nhdr, mrc or map, ply, obj, stl or off (also .gz), json or patch";
+    "vdb, nii, mha, mhd, nrrd, nhdr, mrc or map, ply, obj, stl or off (also .gz), asc, hgt, flt, "
+    "bil, json or patch";
 
-enum class FileKind { Band, Volume, Mesh, Scene, Patch, Unknown };
+enum class FileKind { Band, Volume, Mesh, Terrain, Scene, Patch, Unknown };
 
 FileKind kindOf(const fs::path& file) {
   if (mapping::isPatchFormat(file.string())) return FileKind::Patch;
@@ -34,6 +36,7 @@ FileKind kindOf(const fs::path& file) {
   if (levelset::isBandFormat(file)) return FileKind::Band;
   // A raw file has no header, and the viewer has no options for its layout.
   if (levelset::isVolumeFormat(file) && !levelset::isRawFormat(file)) return FileKind::Volume;
+  if (levelset::isHeightFormat(file)) return FileKind::Terrain;
   return FileKind::Unknown;
 }
 
@@ -107,6 +110,8 @@ void readSolids(const fs::path& file, FileKind kind, const OpenOptions& options,
     model.scene = std::move(viewed.scene);
     const std::vector<fs::path> named = solidFilesOf(file);
     model.watched.insert(model.watched.end(), named.begin(), named.end());
+  } else if (kind == FileKind::Terrain) {
+    model.terrain = std::make_shared<const ShownTerrain>(readShownTerrain(file, options.progress));
   } else if (kind == FileKind::Volume) {
     const levelset::Progress progress = levelset::subProgress(options.progress, 0, 0.5);
     showVolume(file, levelset::readVolume(file, {.progress = progress}), options, model);
@@ -131,13 +136,16 @@ void measureModel(Model& model) {
   // The view must not depend on the isovalue.
   model.solidBounds = model.volume ? model.scene.volumeBounds() : model.scene.bounds();
   if (model.scene.volumePart) model.solidBounds.extendBy(model.scene.volumeBounds());
+  if (model.terrain) model.solidBounds = boundsOf(*model.terrain);
   model.bounds = model.solidBounds;
   for (const mapping::Patch& patch : model.patches) {
     for (const mapping::ParticleLayer& level : patch.layers)
       for (const Imath::V3d& particle : level.positions) model.bounds.extendBy(particle);
     particles += patch.particleCount();
   }
-  if (model.volume) {
+  if (model.terrain) {
+    model.description = model.terrain->description;
+  } else if (model.volume) {
     const levelset::Volume& volume = model.volume->surface.volume();
     const Imath::V3i size = volume.size();
     model.description =
@@ -192,10 +200,10 @@ void requireReadable(const std::vector<fs::path>& files) {
           fmt::format("open: '{}' does not exist; check its name", file.string()));
     if (kind == FileKind::Patch) continue;
     if (solid)
-      throw UsageError(
-          fmt::format("open: '{}' is a second level set, volume, mesh or scene after '{}'; open "
-                      "one of them, or combine both in a scene (see levelsmith help scene)",
-                      file.string(), solid->string()));
+      throw UsageError(fmt::format(
+          "open: '{}' is a second level set, volume, mesh, terrain or scene after '{}'; open "
+          "one of them, or combine both in a scene (see levelsmith help scene)",
+          file.string(), solid->string()));
     solid = &file;
   }
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/viewer/terrain/shown_terrain.h"
 #include "apps/viewer/volume/shown_volume.h"
 #include "levelset/progress.h"
 #include "mapping/patches/patch.h"
@@ -22,6 +23,8 @@ struct Model {
   std::vector<mapping::Patch> patches;
   /// If not null, the only solid of the scene is the first isosurface of this volume.
   std::shared_ptr<const ShownVolume> volume = {};
+  /// If not null, the model is this terrain, and its scene is empty.
+  std::shared_ptr<const ShownTerrain> terrain = {};
   Imath::Box3d solidBounds;  ///< box of the drawn surfaces or of the volume's grid, world units;
                              ///< empty when there are none
   Imath::Box3d bounds;       ///< box of the surfaces and of the patches' particles, world units
@@ -47,11 +50,14 @@ struct OpenOptions {
 /// True for file names with an extension that the viewer can open.
 [[nodiscard]] bool canOpen(const std::filesystem::path& file);
 
-/// Reads a level set, a mesh (which is converted to a level set), a volume or a scene, and the
-/// patches that are shown together with it. A .vdb file without a level set is read as a volume.
+/// Reads a level set, a mesh (which is converted to a level set), a volume, a terrain or a scene,
+/// and the patches that are shown together with it. A .vdb file without a level set is read as a
+/// volume.
 /// @param files  at most one file that is no patch, and any number of patches, in any order
 /// @throws levelset::UsageError for an unknown extension, or a second file that is no patch
-/// @throws as readBand(), readVolume(), readMesh(), meshToBand(), readScene() and readPatches()
+/// @throws as readBand(), readVolume(), readShownTerrain(), readMesh(), meshToBand(), readScene()
+/// and
+///         readPatches()
 [[nodiscard]] Model openModel(const std::vector<std::filesystem::path>& files,
                               const OpenOptions& options = {});
 
