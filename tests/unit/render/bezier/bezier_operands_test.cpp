@@ -235,6 +235,27 @@ TEST(BezierOperands, TransparentOperandsMixInTheOrderOfTheirDepths) {
   }
 }
 
+/// Mirrored rays start at any point, beside and inside the operands.
+TEST(BezierOperands, AreSeenInMirrors) {
+  for (const bool isBandSecond : {false, true}) {
+    Scene scene = twoBalls("b - a", isBandSecond);
+    scene.camera.from = {-4, 0.5, 1};
+    RenderOptions options = kPlain;
+    options.optics = {.reflect = 0.5, .bounces = 2};
+    const Image image = renderCpu(scene, options), judged = renderEmbree(scene, options);
+    const std::vector<float>&a = image.channels.at("R"), &b = judged.channels.at("R");
+    std::size_t hits = 0, different = 0;
+    for (std::size_t n = 0; n < a.size(); ++n) {
+      if (image.ids.at("id")[n] == 0) continue;
+      ++hits;
+      if (!(std::abs(a[n] - b[n]) < 1e-3f)) ++different;
+    }
+    EXPECT_GT(hits, 30U);
+    // Rays that graze an edge of the cut may see the other side of it.
+    EXPECT_LE(different, hits / 50);
+  }
+}
+
 TEST(BezierOperands, AreReadAndWritten) {
   const support::TemporaryFolder folder;
   const Scene scene = twoBalls("a - b", true);
