@@ -192,7 +192,7 @@ def test_deformations_are_values(ls, tmp_path):
     bent = ls.lattice(bend=60, towards=(1, 0, 0), box=((-1, -1, -3), (1, 1, 3)))
     assert isinstance(bent, ls.Deformation) and not bent.is_computed
     moved = bar.deform(bent)
-    assert volume(moved) == pytest.approx(4, rel=1e-2)
+    assert volume(moved) == pytest.approx(4, rel=2e-2)  # without --sharp
     bent.save(str(tmp_path / "bent.json"))
     again = ls.read(str(tmp_path / "bent.json"))
     assert isinstance(again, ls.Deformation)
@@ -203,7 +203,7 @@ def test_deformations_are_values(ls, tmp_path):
     assert rest.points.shape == (2, 3, 4, 3)
     low, high = rest.points.reshape(-1, 3).min(0), rest.points.reshape(-1, 3).max(0)
     wide = ls.Deformation(rest.points * (1.5, 1, 1), (low, high))
-    assert volume(bar.deform(wide)) == pytest.approx(6, rel=1e-2)
+    assert volume(bar.deform(wide)) == pytest.approx(6, rel=2e-2)
     with pytest.raises(ls.InputError, match="shape"):
         ls.Deformation(numpy.zeros((2, 2, 3)), (low, high))
     around = bar.lattice(twist=30)

@@ -91,6 +91,7 @@ FORMS = {
     "Velocity": "three formulas, or a Field",
     "Speed": "number, formula in x, y, z, r, t, nx, ny, nz, k, Field or Solid",
     "Mesh": "Mesh",
+    "Solid": "Solid",
 }
 
 
