@@ -32,7 +32,8 @@ struct DeformPatchesResult {
 /// that patches share stay equal to the bit. An identity returns the patches, unless `onto` is
 /// given.
 ///
-/// The certificate of a cage covers the space of the patches, that of a lattice its entire box.
+/// The certificate of a cage covers the space of the patches without their rims, that of a lattice
+/// its entire box.
 /// @throws InvalidInput for a map that is not proven to be injective, a particle where it is not
 ///         defined, or a particle further than a voxel from the surface of `onto`
 /// @throws ResourceLimit, Cancelled

@@ -535,7 +535,8 @@ double EmbreeScene::thickness(const V3d& origin, const V3d& direction, double ne
     if (!impl_->csg.isEmpty()) return impl_->csg.holds(inside.data());
     return std::find(inside.begin(), inside.end(), 1) != inside.end();
   };
-  std::vector<char> inside(changes.size(), 0);
+  // Bézier volumes of the expression count as absent; requirePicture() refuses them.
+  std::vector<char> inside(changes.size() + impl_->parts.operandCount(), 0);
   std::vector<std::pair<SideChange, std::size_t>> all;
   for (std::size_t s = 0; s < changes.size(); ++s) {
     putInOrder(changes[s]);

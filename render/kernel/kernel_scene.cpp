@@ -443,7 +443,8 @@ std::vector<double> KernelScene::thickness(const KernelTracer& tracer,
     }
   }
   std::vector<double> lengths(pixels.size(), 0);
-  std::vector<char> inside(solids_.size()), known(solids_.size());
+  // Bézier volumes of the expression count as absent; requirePicture() refuses them.
+  std::vector<char> inside(solids_.size() + beziers_.size(), 0), known(solids_.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     std::vector<Crossing>& all = crossings[i];
     std::stable_sort(all.begin(), all.end(),

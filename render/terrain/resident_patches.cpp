@@ -116,11 +116,14 @@ void ResidentPatches::insert(const TerrainPatch& patch,
 }
 
 void ResidentPatches::noteFailure(const TerrainPatch& patch, const std::string& sentence) {
-  if (!failed_.insert(patch).second || failed_.size() > kMostWarnings) return;
+  if (!failed_.insert(patch).second) return;
+  if (failed_.size() > kMostWarnings) {
+    if (failed_.size() == kMostWarnings + 1)
+      warnings_.emplace_back("further patches that cannot be read are not listed");
+    return;
+  }
   warnings_.push_back(fmt::format("patch ({}, {}) of level {} is drawn by a coarser one: {}",
                                   patch.column, patch.row, patch.level, sentence));
-  if (failed_.size() == kMostWarnings)
-    warnings_.emplace_back("further patches that cannot be read are not listed");
 }
 
 void ResidentPatches::request(std::span<const TerrainPatch> needed) {
@@ -133,6 +136,7 @@ void ResidentPatches::request(std::span<const TerrainPatch> needed) {
 }
 
 void ResidentPatches::load(std::span<const TerrainPatch> needed) {
+  const std::scoped_lock alone(loading_);
   std::vector<TerrainPatch> missing;
   {
     const std::scoped_lock lock(mutex_);
@@ -144,6 +148,7 @@ void ResidentPatches::load(std::span<const TerrainPatch> needed) {
     {
       const std::scoped_lock lock(mutex_);
       makeRoom(count);
+      beingRead_ += count;
     }
     std::vector<std::shared_ptr<const PatchHeights>> found(count);
     std::vector<std::string> failures(count);
@@ -155,6 +160,7 @@ void ResidentPatches::load(std::span<const TerrainPatch> needed) {
       }
     });
     const std::scoped_lock lock(mutex_);
+    beingRead_ -= count;
     for (std::size_t n = 0; n < count; ++n)
       if (found[n])
         insert(missing[first + n], std::move(found[n]));
@@ -179,7 +185,7 @@ void ResidentPatches::work(const std::stop_token& stop) {
     if (stop.stop_requested()) return;
     const TerrainPatch patch = waiting_.back();
     waiting_.pop_back();
-    if (entries_.contains(patch) || !makeRoom(1)) continue;
+    if (entries_.contains(patch) || failed_.contains(patch) || !makeRoom(1)) continue;
     ++beingRead_;
     isWorking_ = true;
     lock.unlock();

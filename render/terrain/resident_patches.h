@@ -33,7 +33,8 @@ class ResidentPatches {
  public:
   /// Reads the coarsest patch.
   /// @param maxBytes   limit on the memory of all patches, with those that are just being read
-  /// @param onArrival  called from another thread when a patch arrived or failed; may be empty
+  /// @param onArrival  called from another thread when a patch arrived or failed; may be empty. It
+  ///                   must not throw, nor wait for the thread that destroys this object
   /// @throws UsageError for a limit below the memory of kLeastPatches patches
   /// @throws the error of the store when the coarsest patch cannot be read
   ResidentPatches(std::shared_ptr<const levelset::PatchStore> store, std::size_t maxBytes,
@@ -58,7 +59,8 @@ class ResidentPatches {
   /// Asks for patches, the most important first, instead of those of the call before. Patches
   /// beyond the capacity are ignored. The others stay there until the next call.
   void request(std::span<const TerrainPatch> needed);
-  /// As request(), and waits until all of them were read or have failed.
+  /// As request(), and waits until all of them were read or have failed. Concurrent calls wait for
+  /// each other.
   void load(std::span<const TerrainPatch> needed);
   /// Returns true when the last request is answered, and onArrival() has returned.
   [[nodiscard]] bool isIdle() const;
@@ -87,6 +89,7 @@ class ResidentPatches {
   std::size_t capacity_ = 0;
   TerrainPatch root_;
   std::shared_ptr<const PatchHeights> rootHeights_;
+  std::mutex loading_;  // held by load()
   mutable std::mutex mutex_;
   std::condition_variable_any hasWork_;
   std::unordered_map<TerrainPatch, Entry, PatchHash> entries_;  // without the root

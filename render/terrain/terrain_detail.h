@@ -25,7 +25,8 @@ struct TerrainSelection {
   };
   std::vector<Part> parts;  ///< coarser levels first
   /// All patches that the pixel error needs are drawn. Otherwise some are late, have failed or do
-  /// not fit into the memory, and a coarser patch is drawn for each of them.
+  /// not fit into the memory, and a coarser patch is drawn for each of them. A coarse patch has
+  /// holes around the vertices of missing samples, which are larger than those of the data.
   bool isComplete = true;
 };
 

@@ -229,11 +229,10 @@ const render::Scene& ClippedScene::at(const PlacedPlane& plane) {
 
 double scenePhi(const render::Scene& scene, const std::vector<double>& values) {
   if (values.empty()) return std::numeric_limits<double>::infinity();
-  if (!scene.csg.isEmpty()) {
-    std::vector<double> all = values;
-    all.resize(scene.solids.size() + scene.beziers.size(), std::numeric_limits<double>::infinity());
-    return scene.csg.phi(all.data());
-  }
+  // A Bézier volume has no φ.
+  for (std::size_t n = 0; n < scene.beziers.size(); ++n)
+    if (scene.isOperand(n)) return std::numeric_limits<double>::infinity();
+  if (!scene.csg.isEmpty()) return scene.csg.phi(values.data());
   return *std::min_element(values.begin(), values.end());
 }
 

@@ -61,7 +61,7 @@ void paintPhi(const render::Image& image, const render::Camera& camera, const Pl
               const render::Scene& scene, std::vector<std::uint8_t>& colours);
 
 /// Combines the values φ of all solids at a point to φ of the drawn shape, world units. Returns
-/// infinity without solids. Bézier volumes have no φ, and count as empty.
+/// infinity without solids, and for expressions with Bézier volumes, which have no φ.
 /// @param values  φ of each solid at the point, world units
 [[nodiscard]] double scenePhi(const render::Scene& scene, const std::vector<double>& values);
 

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "levelset/error.h"
+#include "levelset/memory/memory_limit.h"
 #include "render/gpu/device/gl_context.h"
 #include "render/gpu/device/gl_objects.h"
 #include "render/gpu/terrain/patch_slots.h"
@@ -77,7 +78,9 @@ class GlTerrainPainter final : public TerrainPainter {
     // Numbers of vertices are 32-bit integers.
     const auto most =
         std::min(context_.largestTable() / bytes, (std::size_t{1} << 30) / patchSamples());
-    slots_ = PatchSlots(std::min(maxBytes / bytes, std::max<std::size_t>(most, 1)));
+    std::size_t all = 0;
+    for (const levelset::PyramidLevel& level : layout.pyramid.levels) all += level.patches.size();
+    slots_ = PatchSlots(std::min({maxBytes / bytes, std::max<std::size_t>(most, 1), all}));
     if (slots_.capacity() == 0)
       throw levelset::UsageError(
           fmt::format("the heights of a terrain may take {} bytes on the device, but a patch takes "
@@ -100,6 +103,10 @@ class GlTerrainPainter final : public TerrainPainter {
   TerrainPicture draw(const TerrainSelection& selection, const Camera& camera,
                       const TerrainPaint& paint) override {
     validate(camera);
+    // Colours, surfaces and depths, on the device and in the picture.
+    constexpr double kPixelBytes = 44;
+    levelset::requireMemory(kPixelBytes * camera.width * camera.height,
+                            levelset::memoryLimit(levelset::kNoMemoryLimit));
     if (!(paint.towardsLight.length() > 0))
       throw levelset::UsageError("the light of a terrain has no direction; give one");
     TerrainPicture picture;

@@ -328,6 +328,10 @@ TEST(BezierOperands, InnerAndCollapsedFacesAreClosed) {
     whole.patches.push_back(patch);
   }
   EXPECT_EQ(findOpenPatch(whole), 4U);
+  // A copy lies on the same side of each face, so it closes nothing.
+  BezierVolume twice;
+  twice.patches = {whole.patches[0], whole.patches[0]};
+  EXPECT_EQ(findOpenPatch(twice), 0U);
 }
 
 // === Crossings
@@ -369,6 +373,13 @@ TEST(SolidCrossings, SingularRootsCountWhereTheyAreNeeded) {
   EXPECT_EQ(crossingsOf({rootAt(1, true, true), rootAt(2, false)}), (std::vector<double>{1, -2}));
   EXPECT_EQ(crossingsOf({rootAt(1, true, true), rootAt(2, false)}, false),
             (std::vector<double>{-2}));
+}
+
+TEST(SolidCrossings, DropSingularRootsBetweenOverlappingLayers) {
+  // Two layers overlap, and the ray touches a surface between their ends.
+  EXPECT_EQ(crossingsOf({rootAt(1, true), rootAt(2, true), rootAt(3, false),
+                         rootAt(3.5, true, true), rootAt(4, false)}),
+            (std::vector<double>{1, -4}));
 }
 
 TEST(SolidCrossings, TellOpenSurfaces) {

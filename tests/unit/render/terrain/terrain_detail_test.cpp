@@ -195,6 +195,7 @@ TEST(TerrainDetail, StaysWithinItsMemory) {
     }
     most = std::max(most, flown.parts.size());
   }
+  EXPECT_GT(most, 20u);
   EXPECT_LE(detail.mostMemoryUse(), limit);
   EXPECT_GT(detail.mostMemoryUse(), limit / 2);
   // A demand above the memory is drawn coarser.
