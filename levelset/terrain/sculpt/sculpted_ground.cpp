@@ -87,8 +87,12 @@ struct SculptedGround::State {
       change.swapWith(field);
       changed = terrain::united(changed, change.range);
     }
-    // Tiles share patches, so all heights are exchanged first.
-    for (const auto& [place, change] : stroke.tiles) errors->update(field, change.range);
+    // Tiles share patches and coarse cells. A compact stroke is measured once, a long one by tile.
+    const double box = static_cast<double>(changed.columns()) * changed.rows();
+    if (box <= 2.0 * kEditTile * kEditTile * static_cast<double>(stroke.tiles.size()))
+      errors->update(field, changed);
+    else
+      for (const auto& [place, change] : stroke.tiles) errors->update(field, change.range);
     return changed;
   }
 
