@@ -111,7 +111,7 @@ struct PixelTraversal {
   struct Crossings {  ///< next crossing of each ray with one solid
     std::vector<double> depth;
     ShapeBlock shapes;
-    std::vector<BezierRoot> roots = {};  ///< of a Bézier operand, which has no shapes
+    std::vector<BezierRoot> roots = {};  ///< on a Bézier operand, which has no shapes
   };
   std::vector<Crossings> next;
   OperandCrossings beziers = {};

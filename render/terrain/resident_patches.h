@@ -22,7 +22,7 @@ namespace render {
 /// Heights of a patch in memory.
 struct PatchHeights {
   std::vector<float> heights;           ///< as of PatchStore::readPatch()
-  std::array<float, 4> borderErrors{};  ///< of patchBorderErrors()
+  std::array<float, 4> borderErrors{};  ///< from patchBorderErrors()
   std::uint64_t serial = 0;             ///< differs between all patches that were ever read
 };
 

@@ -10,7 +10,7 @@
 
 namespace levelset {
 
-/// What a brush does to the heights below it. w is the weight of a sample, s the strength.
+/// Effect of a brush on the heights below it. w is the weight of a sample, s the strength.
 enum class BrushEffect {
   Raise,    ///< adds s·w; a negative strength lowers
   Flatten,  ///< moves heights by the share s·w towards BrushDab::level

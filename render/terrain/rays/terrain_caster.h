@@ -39,7 +39,7 @@ struct TerrainHit {
   /// Unit normals on the upper side, for shading and of the triangle.
   Imath::V3d normal{0}, facetNormal{0};
   double height = 0;  ///< in the field
-  int column = 0;     ///< of the cell
+  int column = 0;     ///< place of the cell
   int halfRow = 0;    ///< twice the row of the cell, plus 1 for its upper triangle
 };
 
