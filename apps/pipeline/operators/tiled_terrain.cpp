@@ -62,6 +62,7 @@ Value readTiledTerrain(Invocation& in) {
 Plan planTiledTerrain(Invocation& in) {
   const levelset::TiledGroundInfo info = levelset::tiledGroundInfo(in.text("file"), in.maxMemory);
   const levelset::HeightField grid = levelset::groundGrid(info.layout, groundOptions(in));
+  levelset::requireGroundMemory(grid, in.maxMemory);
   Plan plan{.kind = Kind::Terrain, .samples = {grid.columns, grid.rows}};
   plan.fieldBytes = static_cast<double>(grid.columns) * grid.rows * sizeof(float);
   const levelset::PyramidPatch& top = info.layout.pyramid.levels.back().patches[0];

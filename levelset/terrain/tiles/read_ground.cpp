@@ -64,16 +64,6 @@ HeightField partGrid(const GroundLayout& layout, const GroundPart& part, int lev
           .isGeographic = layout.isGeographic};
 }
 
-void requireGroundMemory(const HeightField& grid, std::size_t maxMemory) {
-  const double bytes = static_cast<double>(grid.columns) * grid.rows * sizeof(float);
-  const std::size_t left = memoryLeft(memoryLimit(maxMemory));
-  if (bytes <= static_cast<double>(left)) return;
-  throw ResourceLimit(fmt::format(
-      "this part of the terrain has {}x{} samples, {:.3g} GB, but {:.3g} GB are left; give --box, "
-      "or a coarser --level, or raise --max-memory",
-      grid.columns, grid.rows, bytes * 1e-9, static_cast<double>(left) * 1e-9));
-}
-
 /// Copies what a patch has of the part. @param heights  of the patch
 void copyPatchInto(HeightField& field, const GroundPart& part, int column, int row, int cells,
                    const std::vector<float>& heights) {
@@ -91,6 +81,16 @@ void copyPatchInto(HeightField& field, const GroundPart& part, int column, int r
 }
 
 }  // namespace
+
+void requireGroundMemory(const HeightField& grid, std::size_t maxMemory) {
+  const double bytes = static_cast<double>(grid.columns) * grid.rows * sizeof(float);
+  const std::size_t left = memoryLeft(memoryLimit(maxMemory));
+  if (bytes <= static_cast<double>(left)) return;
+  throw ResourceLimit(fmt::format(
+      "this part of the terrain has {}x{} samples, {:.3g} GB, but {:.3g} GB are left; give --box, "
+      "or a coarser --level, or raise --max-memory",
+      grid.columns, grid.rows, bytes * 1e-9, static_cast<double>(left) * 1e-9));
+}
 
 HeightField groundGrid(const GroundLayout& layout, const ReadGroundOptions& options) {
   return partGrid(layout, partOf(layout, options), options.level);

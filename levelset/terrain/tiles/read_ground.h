@@ -31,4 +31,8 @@ struct ReadGroundOptions {
 [[nodiscard]] HeightField groundGrid(const GroundLayout& layout,
                                      const ReadGroundOptions& options = {});
 
+/// Checks that the heights of a result of groundGrid() fit into memory.
+/// @throws ResourceLimit, with the options that read less
+void requireGroundMemory(const HeightField& grid, std::size_t maxMemory);
+
 }  // namespace levelset

@@ -45,14 +45,14 @@ TEST_F(TiledTerrain, WriteAndReadKeepTheTerrain) {
 
 TEST_F(TiledTerrain, ReadTakesAPartAndALevel) {
   ASSERT_EQ(levelsmith("read ground.asc ! write a.lst --cells 4").code, 0);
-  EXPECT_EQ(json("read a.lst --box '100,50,0 305,120,0' ! info --json")["hash"],
-            json("read ground.asc ! terrain --crop '100,50,0 305,120,0' ! info --json")["hash"]);
+  EXPECT_EQ(json("read a.lst --box '100,50,0 305,120,1' ! info --json")["hash"],
+            json("read ground.asc ! terrain --crop '100,50,0 305,120,1' ! info --json")["hash"]);
   const Json coarse = json("read a.lst --level 2 ! info --json");
   EXPECT_EQ(coarse["columns"], 11);
   EXPECT_EQ(coarse["rows"], 7);
   EXPECT_EQ(coarse["spacing"], (Json{40.0, 40.0}));
   expectRefusal("read a.lst --level 9", 2, "has no level 9; give 0 to 4");
-  expectRefusal("read a.lst --box '900,0,0 901,1,0'", 3, "has no sample");
+  expectRefusal("read a.lst --box '900,0,0 901,1,1'", 3, "has no sample");
   expectRefusal("read ground.asc --level 1", 2, "--level is for tiled terrains");
   expectRefusal("read ground.asc ! write b.asc --tolerance 1", 2, "--tolerance is for tiled");
   expectRefusal("read ground.asc ! write b.lst --cells 5", 2, "power of two");
@@ -64,7 +64,7 @@ TEST_F(TiledTerrain, ReadTakesAPartAndALevel) {
 TEST_F(TiledTerrain, PlansFromTheIndex) {
   ASSERT_EQ(levelsmith("read ground.asc ! write a.lst").code, 0);
   const support::Outcome plan =
-      levelsmith("--dry-run read a.lst --box '100,50,0 305,120,0' ! terrain --scale 2");
+      levelsmith("--dry-run read a.lst --box '100,50,0 305,120,1' ! terrain --scale 2");
   EXPECT_EQ(plan.code, 0) << plan.err;
 }
 
@@ -142,7 +142,7 @@ TEST_F(SlowTiledTerrain, WorksBeyondTheMemoryLimit) {
   ASSERT_EQ(levelsmith(limit + "tile-terrain large.raw a.lst --size 8193,8193,1 --type i16").code,
             0);
   expectRefusal(limit + "read a.lst", 4, "give --box, or a coarser --level");
-  const Json part = json(limit + "read a.lst --box '6000,6000,0 6100,6050,0' ! info --json");
+  const Json part = json(limit + "read a.lst --box '6000,6000,0 6100,6050,1' ! info --json");
   EXPECT_EQ(part["columns"], 101);
   EXPECT_EQ(part["range"], (Json{187.0, 189.0}));
   EXPECT_EQ(json(limit + "read a.lst --level 3 ! info --json")["columns"], 1025);
