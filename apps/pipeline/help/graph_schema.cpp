@@ -105,7 +105,8 @@ Json actionSchema(const Operator& op) {
   if (op.flow == Flow::Makes) properties["as"] = {{"type", "string"}, {"minLength", 1}};
   Json needed = {"op"};
   if (!required.empty()) needed.push_back("options");
-  if (!op.operands.empty() && !op.operandsOptional) needed.push_back("inputs");
+  if (!op.operands.empty() && !op.operandsOptional && op.noneWith.empty())
+    needed.push_back("inputs");
   return {{"description", op.summary},
           {"type", "object"},
           {"properties", properties},

@@ -343,8 +343,7 @@ Operator renderOperator() {
       .name = "render",
       .group = "Pictures",
       .summary =
-          "draw a level set, isosurface, mesh, segmentation, molecule, terrain or scene to an EXR "
-          "with all layers, or a PNG",
+          "draw a solid, volume, mesh, segmentation, molecule, terrain or scene to an EXR or PNG",
       .details =
           "Layers of the EXR: R G B A, Z (along the view axis, +inf for a miss), N.X N.Y N.Z, P.X "
           "P.Y P.Z, curvature.mean .gauss .k1 .k2, id. Without --from, the view is the scene's "

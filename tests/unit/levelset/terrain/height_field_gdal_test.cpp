@@ -198,7 +198,11 @@ TEST_F(GdalGrid, AppliesScaleAndOffset) {
 
 TEST_F(GdalGrid, LeavesOutMaskedSamples) {
   const Tiff heights = Tiff().image<float>(2, 2, {1, 2, 3, 4}).place(0, 0, 1, 1);
-  writeText(folder_ / "a.tif.msk", Tiff().image<std::uint8_t>(2, 2, {255, 0, 255, 255}).str());
+  // Flags of 0: the mask is that of the band. Without them GDAL does not use the file.
+  const std::string flags =
+      "<GDALMetadata><Item name=\"INTERNAL_MASK_FLAGS_1\">0</Item></GDALMetadata>";
+  writeText(folder_ / "a.tif.msk",
+            Tiff().image<std::uint8_t>(2, 2, {255, 0, 255, 255}).text(42112, flags).str());
   const HeightField field = read(heights);
   EXPECT_TRUE(field.isMissing(1, 1));
   EXPECT_EQ(field.missingCount(), 1u);
