@@ -235,7 +235,7 @@ std::string_view MappedFile::view() const {
 }
 
 void MappedFile::release(std::size_t end) {
-  constexpr std::size_t kInterval = 1 << 26;
+  constexpr std::size_t kInterval = 1 << 22;
   end -= end % kInterval;
   if (!mapped_ || end <= released_) return;
   ::madvise(static_cast<char*>(mapped_) + released_, end - released_, MADV_DONTNEED);

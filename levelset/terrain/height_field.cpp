@@ -58,7 +58,7 @@ std::uint64_t HeightField::contentHash() const {
   return hash;
 }
 
-void requireHeights(const HeightField& field) {
+void requireGrid(const HeightField& field) {
   if (field.columns < 1 || field.rows < 1 || field.columns > kMostSamples ||
       field.rows > kMostSamples)
     throw InvalidInput(fmt::format(
@@ -77,6 +77,10 @@ void requireHeights(const HeightField& field) {
     throw InvalidInput(
         fmt::format("the position of the height field, {}, {}, is not finite; correct its origin",
                     field.origin.x, field.origin.y));
+}
+
+void requireHeights(const HeightField& field) {
+  requireGrid(field);
   const std::size_t count =
       static_cast<std::size_t>(field.columns) * static_cast<std::size_t>(field.rows);
   if (field.heights.size() != count)
@@ -94,8 +98,8 @@ void requireHeights(const HeightField& field) {
   }
 }
 
-void requireLengths(const HeightField& field) {
-  if (field.isGeographic)
+void requireLengths(bool isGeographic) {
+  if (isGeographic)
     throw InvalidInput(
         "x and y are degrees, but this needs lengths; put 'terrain --metric' before it, or use "
         "data in a projection");

@@ -58,14 +58,22 @@ struct HeightField {
   [[nodiscard]] std::uint64_t contentHash() const;
 };
 
+/// Checks the size and the place of a height field, but not its heights.
+/// @throws InvalidInput for sizes below 1 or above 2^30, a spacing that is not positive, or a
+///         position that is not finite
+void requireGrid(const HeightField& field);
+
 /// Checks a height field. Readers and operators call it.
-/// @throws InvalidInput for sizes below 1 or above 2^30, a spacing that is not positive, an origin
-///         that is not finite, an infinite height, or another number of heights than rows × columns
+/// @throws InvalidInput as requireGrid(), and for an infinite height, or another number of heights
+///         than rows × columns
 void requireHeights(const HeightField& field);
 
 /// Refuses a field in degrees, where lengths along x, y and z have different units.
 /// @throws InvalidInput: "x and y are degrees, but …"
-void requireLengths(const HeightField& field);
+void requireLengths(bool isGeographic);
+inline void requireLengths(const HeightField& field) {
+  requireLengths(field.isGeographic);
+}
 
 /// Makes a height field of a volume with one layer, such as a raw file of heights. Row j of the
 /// volume is row j of the field, so the first row has the least y.

@@ -38,7 +38,7 @@ PyramidPatch measurePatch(const HeightField& field, int cells, int level, int co
           error, coarseCellError(field, static_cast<int>(i), static_cast<int>(j),
                                  static_cast<int>(std::min<std::int64_t>(i + stride, lastColumn)),
                                  static_cast<int>(std::min<std::int64_t>(j + stride, lastRow))));
-  patch.error = terrain::heightRoundedUp(error);
+  patch.error = heightRoundedUp(error);
   return patch;
 }
 

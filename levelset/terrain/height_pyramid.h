@@ -50,6 +50,9 @@ struct PyramidOptions {
 [[nodiscard]] HeightPyramid heightPyramid(const HeightField& field,
                                           const PyramidOptions& options = {});
 
+/// Rounds up to float, so that a bound stays one.
+[[nodiscard]] float heightRoundedUp(double bound);
+
 /// Largest vertical distance between the ground and two triangles over a rectangle of cells, with
 /// the diagonal from the corner of least x and y. The difference of the surfaces is linear between
 /// their edges, so it is greatest at a sample or where the diagonal crosses an edge of a cell.

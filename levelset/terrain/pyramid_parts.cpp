@@ -78,13 +78,6 @@ void takeBounds(PyramidLevel& level, const PyramidLevel& finer) {
     }
 }
 
-float heightRoundedUp(double x) {
-  const auto rounded = static_cast<float>(x);
-  return static_cast<double>(rounded) < x
-             ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
-             : rounded;
-}
-
 void CoarseCell::Deviation::raiseTo(const Deviation& other) {
   error = std::max(error, other.error);
   magnitude = std::max(magnitude, other.magnitude);
@@ -168,3 +161,14 @@ double CoarseCell::bound(const Deviation& deviation) const {
 }
 
 }  // namespace levelset::terrain
+
+namespace levelset {
+
+float heightRoundedUp(double x) {
+  const auto rounded = static_cast<float>(x);
+  return static_cast<double>(rounded) < x
+             ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
+             : rounded;
+}
+
+}  // namespace levelset

@@ -20,9 +20,6 @@ void requirePyramid(int columns, int rows, int cells);
 /// Raises the bounds of a level to those of the finer level.
 void takeBounds(PyramidLevel& level, const PyramidLevel& finer);
 
-/// Rounds up to float, so that a bound stays one.
-[[nodiscard]] float heightRoundedUp(double x);
-
 /// Two triangles over a rectangle of cells, with the diagonal from the corner of least x and y.
 /// Compares them with the ground, part by part: the parts may come in any order.
 class CoarseCell {

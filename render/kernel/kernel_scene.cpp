@@ -350,8 +350,9 @@ PixelTraversal KernelScene::startTraversal(const KernelTracer& tracer,
 std::vector<PixelTraversal::Crossings> KernelScene::emptyCrossings(std::size_t rays) const {
   std::vector<PixelTraversal::Crossings> next(solids_.size(),
                                               {std::vector<double>(rays), ShapeBlock(rays)});
-  next.resize(operandCount(), {std::vector<double>(rays), ShapeBlock(0),
-                               std::vector<BezierRoot>(operands_.empty() ? 0 : rays)});
+  if (!operands_.empty())
+    next.resize(operandCount(),
+                {std::vector<double>(rays), ShapeBlock(0), std::vector<BezierRoot>(rays)});
   return next;
 }
 

@@ -73,13 +73,6 @@ double pairError(const BorderPair& pair, bool isUpper) {
   return std::max(std::abs(atVertex), std::abs(atCentre));
 }
 
-float borderRoundedUp(double x) {
-  const auto rounded = static_cast<float>(x);
-  return static_cast<double>(rounded) < x
-             ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
-             : rounded;
-}
-
 }  // namespace
 
 PatchBorderSets::PatchBorderSets(int cells) {
@@ -132,7 +125,7 @@ std::array<float, 4> patchBorderErrors(const PatchGrid& grid, const TerrainPatch
       }
       error = std::max(error, pairError(pair, isUpper));
     }
-    errors[side] = borderRoundedUp(error);
+    errors[side] = levelset::heightRoundedUp(error);
   }
   return errors;
 }

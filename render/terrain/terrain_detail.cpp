@@ -7,22 +7,11 @@
 #include <utility>
 
 #include "levelset/error.h"
-#include "render/terrain/patch_borders.h"
 #include "render/terrain/resident_patches.h"
 #include "render/terrain/terrain_cut.h"
 #include "render/terrain/terrain_view.h"
 
 namespace render {
-namespace {
-
-void requireMetres(const levelset::GroundLayout& layout) {
-  if (!layout.isGeographic) return;
-  throw levelset::InvalidInput(
-      "x and y are degrees, but this needs lengths; put 'terrain --metric' before it");
-}
-
-}  // namespace
-
 struct TerrainDetail::Patches {
   std::shared_ptr<const levelset::PatchStore> store;
   PatchGrid grid;
@@ -63,7 +52,7 @@ struct TerrainDetail::Patches {
 
 TerrainDetail::TerrainDetail(std::shared_ptr<const levelset::PatchStore> store,
                              TerrainDetailOptions options) {
-  requireMetres(store->layout());
+  levelset::requireLengths(store->layout().isGeographic);
   patches_.reset(new Patches{
       store, PatchGrid(store->layout()), {store, options.maxBytes, std::move(options.onArrival)}});
 }

@@ -10,12 +10,6 @@ namespace {
 using Imath::Box3d;
 using Imath::V3d;
 
-/// Corner of a box that is farthest along a direction.
-V3d farthestCorner(const Box3d& box, const V3d& along) {
-  return {along.x > 0 ? box.max.x : box.min.x, along.y > 0 ? box.max.y : box.min.y,
-          along.z > 0 ? box.max.z : box.min.z};
-}
-
 /// Distances along x and y from the origin to the nearest and to the farthest point of a range.
 double nearestOf(double low, double high) {
   return low > 0 ? low : high < 0 ? -high : 0;
@@ -59,9 +53,8 @@ std::optional<TerrainView::Planes> TerrainView::crossed(const Box3d& box, Planes
   for (std::size_t n = 0; n < planes_.size(); ++n) {
     if ((planes & 1u << n) == 0) continue;
     const Plane& plane = planes_[n];
-    if (farthestCorner(relative, plane.normal).dot(plane.normal) < plane.offset)
-      return std::nullopt;
-    if (farthestCorner(relative, -plane.normal).dot(plane.normal) < plane.offset) left |= 1u << n;
+    if (extentOf(relative, plane.normal) < plane.offset) return std::nullopt;
+    if (-extentOf(relative, -plane.normal) < plane.offset) left |= 1u << n;
   }
   return left;
 }
@@ -81,7 +74,7 @@ double TerrainView::allowedError(const Box3d& box) const {
       V3d(nearestOf(b.min.x, b.max.x), nearestOf(b.min.y, b.max.y), nearestOf(b.min.z, b.max.z))
           .length();
   const double across = std::hypot(farthestOf(b.min.x, b.max.x), farthestOf(b.min.y, b.max.y));
-  const double leastDepth = farthestCorner(b, -axis_).dot(axis_);  // of all points of the box
+  const double leastDepth = -extentOf(b, -axis_);  // of all points of the box
   const double depth = std::max({distance / widestSlope_, near_, leastDepth});
   if (!(depth > 0)) return 0;
   const double slope = pixelsPerSlope_ * std::min(widestSlope_, across / depth);

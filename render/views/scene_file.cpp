@@ -289,8 +289,11 @@ Imath::Box3d readBox(const Reader& reader, const Json& json, const char* name,
   const Json& corners = reader.member(json, name, where);
   if (!corners.is_array() || corners.size() != 2)
     reader.refuse(where, fmt::format("has an \"{}\" that is not a list of two corners", name));
-  const Json both = {{"low", corners[0]}, {"high", corners[1]}};
-  return {reader.point(both, "low", where), reader.point(both, "high", where)};
+  const auto corner = [&](std::size_t n) {
+    const Json one = {{name, corners[n]}};
+    return reader.point(one, name, where);
+  };
+  return {corner(0), corner(1)};
 }
 
 std::vector<HeightColour> readRamp(const Reader& reader, const Json& json,
@@ -337,7 +340,9 @@ levelset::Volume placedBy(const Imath::M44d& transform, const levelset::Volume& 
                           const levelset::Progress& progress) {
   for (int row = 0; row < 4; ++row)
     if (transform[row][3] != (row == 3 ? 1 : 0))
-      throw InvalidInput("the last column of the transform is not 0, 0, 0, 1");
+      throw InvalidInput(
+          "the last column of the transform is not 0, 0, 0, 1; give these numbers there, and a "
+          "translation in the last row");
   levelset::VolumeGrid grid = volume.grid();
   grid.indexToWorld = grid.indexToWorld * transform;
   // The copy shares the numbers.

@@ -50,14 +50,6 @@ Json toJson(const Camera& camera) {
   return json;
 }
 
-void requireColour(const Imath::C3f& colour) {
-  for (int c = 0; c < 3; ++c)
-    if (!(colour[c] >= 0 && colour[c] <= 1))
-      throw InvalidInput(
-          fmt::format("the colour {}, {}, {} is out of range; give three numbers from 0 to 1",
-                      colour.x, colour.y, colour.z));
-}
-
 Json terrainJson(const TerrainPart& part, const std::string& file) {
   Json entry = {
       {"name", part.name}, {"file", file}, {"colour", colourJson(part.colour)}, {"id", part.id}};

@@ -61,11 +61,8 @@ inline levelset::HeightField fractalTerrain(int power, double roughness, std::ui
 
 /// Keeps the first columns and rows of a field.
 inline levelset::HeightField cutTerrain(const levelset::HeightField& field, int columns, int rows) {
-  levelset::HeightField part{.columns = columns, .rows = rows, .spacing = field.spacing};
-  part.origin = field.origin;
-  for (int row = 0; row < rows; ++row)
-    for (int column = 0; column < columns; ++column) part.heights.push_back(field.at(column, row));
-  return part;
+  const Imath::V2d end = field.position(columns - 1, rows - 1);
+  return levelset::croppedHeights(field, {{field.origin.x, field.origin.y, 0}, {end.x, end.y, 0}});
 }
 
 inline std::unique_ptr<levelset::PatchStore> storeOf(levelset::HeightField field, int cells) {

@@ -65,6 +65,10 @@ std::string operandText(const Operator& op) {
   std::string text;
   for (const std::vector<Kind>& kinds : op.operands) {
     if (!text.empty()) text += ", ";
+    if (kinds.size() == kKinds) {
+      text += "any value";
+      continue;
+    }
     for (std::size_t i = 0; i < kinds.size(); ++i)
       text += (i ? " or " : "") + std::string(kindName(kinds[i]));
   }

@@ -28,4 +28,14 @@ inline Param jsonParam() {
           .doc = "print the results as one JSON object on standard output"};
 }
 
+/// Array of the coordinates.
+[[nodiscard]] inline Json toJson(const Imath::V3d& v) {
+  return Json::array({v.x, v.y, v.z});
+}
+/// Corners of a box; null if it is empty.
+[[nodiscard]] inline Json toJson(const Imath::Box3d& box) {
+  if (box.isEmpty()) return nullptr;
+  return {{"min", toJson(box.min)}, {"max", toJson(box.max)}};
+}
+
 }  // namespace pipeline

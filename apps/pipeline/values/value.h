@@ -42,6 +42,8 @@ enum class Kind {
   Terrain,       ///< heights of a ground on a regular grid
   Deformation    ///< a map of space: a lattice of control points, or a cage
 };
+/// Kinds that a Value may have.
+inline constexpr std::size_t kKinds = static_cast<std::size_t>(Kind::Deformation) + 1;
 [[nodiscard]] const char* kindName(Kind kind);
 /// Returns the name with its article: "a mesh", "an adaptive field".
 [[nodiscard]] std::string kindPhrase(Kind kind);

@@ -156,11 +156,14 @@ struct ProgressivePicture::Worker {
   }
 
   /// Draws the terrain of the model. Its pictures have full resolution at once.
-  void drawTerrain() {
+  void requireTerrainLayer() const {
     if (display.layer >= Layer::MeanCurvature && display.layer <= Layer::K2)
       throw levelset::UsageError("a terrain has no curvature layers; choose another layer");
     if (view.hasThickness || display.layer == Layer::Thickness)
       throw levelset::UsageError("a terrain has no thickness; choose another layer");
+  }
+
+  void drawTerrain() {
     if (terrainModel != view.model) {
       terrainFrames = nullptr;
       terrainFrames = std::make_unique<TerrainFrames>(*view.model->terrain);
@@ -382,7 +385,9 @@ void ProgressivePicture::run() {
     std::exception_ptr failure;
     try {
       if (worker.view.model->terrain) {
-        worker.drawTerrain();
+        worker.requireTerrainLayer();
+        // Another layer needs no new picture.
+        if (!isRecoloured || !worker.isTerrainFinal) worker.drawTerrain();
         frame = worker.shown();
       } else if (isRecoloured) {
         frame = worker.shown();

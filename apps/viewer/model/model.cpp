@@ -25,7 +25,7 @@ using levelset::UsageError;
 
 constexpr const char* kFormats =
     "vdb, nii, mha, mhd, nrrd, nhdr, mrc or map, ply, obj, stl or off (also .gz), asc, hgt, flt, "
-    "bil, json or patch";
+    "bil, tif, dem or dt0 to dt2, json or patch";
 
 enum class FileKind { Band, Volume, Mesh, Terrain, Scene, Patch, Unknown };
 

@@ -104,7 +104,8 @@ render::Image imageOf(const render::TerrainPicture& picture, const render::Camer
     depths[n] = surface.w;
     if (std::isinf(surface.w)) continue;
     ids[n] = kTerrainId;
-    for (std::size_t c = 0; c < 4; ++c) (*colours[c])[n] = kLinear[picture.colours[4 * n + c]];
+    for (std::size_t c = 0; c < 3; ++c) (*colours[c])[n] = kLinear[picture.colours[4 * n + c]];
+    (*colours[3])[n] = 1;
     const auto x = static_cast<int>(n) % picture.width, y = static_cast<int>(n) / picture.width;
     const render::Camera::Ray ray = rays.at(x + 0.5, y + 0.5);
     const Imath::V3d p = ray.origin + ray.direction * (static_cast<double>(surface.w) /

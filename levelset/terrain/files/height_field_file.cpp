@@ -70,8 +70,7 @@ HeightField readHeightField(const std::filesystem::path& path,
 
 bool isHeightFormat(const std::filesystem::path& nameOrFormat) {
   const std::string format = terrain::heightFormatOf(nameOrFormat);
-  return format == "asc" || format == "hgt" || format == "flt" || format == "bil" ||
-         terrain::isGdalFormat(format);
+  return isRowFormat(format) || terrain::isGdalFormat(format);
 }
 
 bool isAsciiGridFormat(const std::filesystem::path& nameOrFormat) {

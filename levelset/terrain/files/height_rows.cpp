@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
 #include "levelset/error.h"
 #include "levelset/files/byte_io.h"
@@ -165,32 +166,56 @@ struct NumberForm {
   }
 };
 
+/// Tells which numbers of a file are missing samples.
+struct MissingMark {
+  std::optional<double> number = {};
+  bool withNan = false;  ///< NaN is missing beside the number, too
+
+  template <typename T>
+  [[nodiscard]] bool isMissing(T value) const {
+    if (!number) return false;
+    if constexpr (std::is_floating_point_v<T>)
+      if (std::isnan(value)) return withNan || std::isnan(*number);
+    // A file of floats rounds its mark to a float, too.
+    if constexpr (std::is_same_v<T, float>) return value == static_cast<float>(*number);
+    return static_cast<double>(value) == *number;
+  }
+};
+
 /// Reads numbers of type T. @param isSwapped  their bytes have the other order
+/// @return number of the first height that is not finite; that of all heights if there is none
 template <typename T>
-void loadHeights(const char* from, bool isSwapped, std::span<float> heights) {
-  for (float& height : heights) {
+std::size_t loadHeights(const char* from, bool isSwapped, const MissingMark& mark,
+                        std::span<float> heights) {
+  for (std::size_t n = 0; n < heights.size(); ++n, from += sizeof(T)) {
     std::array<char, sizeof(T)> raw;
     std::memcpy(raw.data(), from, sizeof(T));
     if (isSwapped) std::reverse(raw.begin(), raw.end());
-    height = static_cast<float>(std::bit_cast<T>(raw));
-    from += sizeof(T);
+    const T value = std::bit_cast<T>(raw);
+    const bool isMissing = mark.isMissing(value);
+    heights[n] = isMissing ? kMissingHeight : static_cast<float>(value);
+    if (!isMissing && !std::isfinite(heights[n])) return n;
   }
+  return heights.size();
 }
 
 class BinaryRows final : public HeightRows {
  public:
-  /// @param expected  completes the message about a file of another size: "… from its header"
+  /// @param isRaw  the file has no header: its form is that of the caller
   BinaryRows(const std::filesystem::path& path, HeightField grid, const NumberForm& form,
-             std::size_t maxMemory, const std::string& expected)
-      : path_(path), file_(path, maxMemory, false), grid_(std::move(grid)), form_(form) {
+             std::size_t maxMemory, bool isRaw)
+      : path_(path),
+        file_(path, maxMemory, false),
+        grid_(std::move(grid)),
+        form_(form),
+        isRaw_(isRaw) {
     const std::size_t bytes = form.skip + rowBytes() * static_cast<std::size_t>(grid_.rows);
     if (file_.view().size() != bytes)
-      refuseRows(path,
-                 fmt::format("the file has {} bytes, but {} follow from {}, {}x{} "
-                             "heights; {}",
-                             file_.view().size(), bytes, expected.empty() ? "its header" : expected,
-                             grid_.columns, grid_.rows,
-                             expected.empty() ? "copy both files again" : "correct the size"));
+      refuseRows(path, fmt::format("the file has {} bytes, but {} follow from {}, {}x{} "
+                                   "heights; {}",
+                                   file_.view().size(), bytes, isRaw ? "its size" : "its header",
+                                   grid_.columns, grid_.rows,
+                                   isRaw ? "correct the size" : "copy both files again"));
   }
 
   const HeightField& grid() const override { return grid_; }
@@ -199,8 +224,12 @@ class BinaryRows final : public HeightRows {
 
   bool next(std::span<float> heights) override {
     const std::size_t begin = form_.skip + rowBytes() * static_cast<std::size_t>(row_++);
-    load(file_.view().data() + begin, heights);
-    markMissing(heights);
+    if (const std::size_t bad = load(file_.view().data() + begin, heights); bad < heights.size())
+      refuseRows(
+          path_,
+          fmt::format("the height in row {}, column {} is {}; {}", row_, bad + 1, heights[bad],
+                      isRaw_ ? "repair it, or give the number of missing samples"
+                             : "mark missing heights with NODATA_value in the header"));
     file_.release(begin);
     return true;
   }
@@ -210,37 +239,25 @@ class BinaryRows final : public HeightRows {
     return form_.size() * static_cast<std::size_t>(grid_.columns);
   }
 
-  void load(const char* from, std::span<float> heights) const {
+  /// @return as loadHeights()
+  std::size_t load(const char* from, std::span<float> heights) const {
     const bool isSwapped = form_.isBigEndian != (std::endian::native == std::endian::big);
-    if (form_.type == "u8") loadHeights<std::uint8_t>(from, isSwapped, heights);
-    if (form_.type == "i8") loadHeights<std::int8_t>(from, isSwapped, heights);
-    if (form_.type == "u16") loadHeights<std::uint16_t>(from, isSwapped, heights);
-    if (form_.type == "i16") loadHeights<std::int16_t>(from, isSwapped, heights);
-    if (form_.type == "u32") loadHeights<std::uint32_t>(from, isSwapped, heights);
-    if (form_.type == "i32") loadHeights<std::int32_t>(from, isSwapped, heights);
-    if (form_.type == "f32") loadHeights<float>(from, isSwapped, heights);
-    if (form_.type == "f64") loadHeights<double>(from, isSwapped, heights);
-  }
-
-  void markMissing(std::span<float> heights) const {
-    // A file of floats rounds its mark to a float, too.
-    const float mark = grid_.noData ? static_cast<float>(*grid_.noData) : 0;
-    for (std::size_t column = 0; column < heights.size(); ++column) {
-      float& height = heights[column];
-      const bool isMissing =
-          grid_.noData && (height == mark || (std::isnan(height) && std::isnan(mark)));
-      if (!isMissing && !std::isfinite(height))
-        refuseRows(path_, fmt::format("the height in row {}, column {} is {}; mark missing "
-                                      "heights with NODATA_value in the header",
-                                      row_, column + 1, height));
-      if (isMissing) height = kMissingHeight;
-    }
+    const MissingMark mark{.number = grid_.noData, .withNan = isRaw_};
+    if (form_.type == "u8") return loadHeights<std::uint8_t>(from, isSwapped, mark, heights);
+    if (form_.type == "i8") return loadHeights<std::int8_t>(from, isSwapped, mark, heights);
+    if (form_.type == "u16") return loadHeights<std::uint16_t>(from, isSwapped, mark, heights);
+    if (form_.type == "i16") return loadHeights<std::int16_t>(from, isSwapped, mark, heights);
+    if (form_.type == "u32") return loadHeights<std::uint32_t>(from, isSwapped, mark, heights);
+    if (form_.type == "i32") return loadHeights<std::int32_t>(from, isSwapped, mark, heights);
+    if (form_.type == "f32") return loadHeights<float>(from, isSwapped, mark, heights);
+    return loadHeights<double>(from, isSwapped, mark, heights);
   }
 
   std::filesystem::path path_;
   MappedFile file_;
   HeightField grid_;
   NumberForm form_;
+  bool isRaw_;
   int row_ = 0;
 };
 
@@ -293,7 +310,7 @@ std::unique_ptr<HeightRows> openHeaderedGrid(const std::filesystem::path& path, 
                       "supported",
                       word));
   terrain::readProjection(path, field);
-  return std::make_unique<BinaryRows>(path, std::move(field), form, maxMemory, "");
+  return std::make_unique<BinaryRows>(path, std::move(field), form, maxMemory, false);
 }
 
 // === Tiles of the Shuttle Radar Topography Mission
@@ -343,7 +360,7 @@ std::unique_ptr<HeightRows> openShuttleTile(const std::filesystem::path& path,
                     .coordinateSystem = "WGS 84",
                     .isGeographic = true};
   return std::make_unique<BinaryRows>(
-      path, std::move(field), NumberForm{.type = "i16", .isBigEndian = true}, maxMemory, "");
+      path, std::move(field), NumberForm{.type = "i16", .isBigEndian = true}, maxMemory, false);
 }
 
 }  // namespace
@@ -351,6 +368,11 @@ std::unique_ptr<HeightRows> openShuttleTile(const std::filesystem::path& path,
 std::unique_ptr<HeightRows> rowsOf(const HeightField& field) {
   requireHeights(field);
   return std::make_unique<FieldRows>(field);
+}
+
+bool isRowFormat(const std::filesystem::path& nameOrFormat) {
+  const std::string format = terrain::heightFormatOf(nameOrFormat);
+  return format == "asc" || format == "hgt" || format == "flt" || format == "bil";
 }
 
 std::unique_ptr<HeightRows> openHeightRows(const std::filesystem::path& path,
@@ -385,7 +407,7 @@ std::unique_ptr<HeightRows> openRawHeightRows(const std::filesystem::path& path,
                    .origin = raw.origin,
                    .spacing = raw.spacing,
                    .noData = raw.noData};
-  return std::make_unique<BinaryRows>(path, std::move(grid), form, kNoMemoryLimit, "its size");
+  return std::make_unique<BinaryRows>(path, std::move(grid), form, raw.maxMemory, true);
 }
 
 }  // namespace levelset

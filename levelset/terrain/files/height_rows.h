@@ -39,6 +39,9 @@ struct HeightRowsOptions {
   std::size_t maxMemory = kNoMemoryLimit;
 };
 
+/// Returns true for the formats that openHeightRows() reads: asc, hgt, flt and bil.
+[[nodiscard]] bool isRowFormat(const std::filesystem::path& nameOrFormat);
+
 /// Opens a file that readHeightField() reads, with the same errors. Only the pages of the file that
 /// are in use are in memory.
 [[nodiscard]] std::unique_ptr<HeightRows> openHeightRows(const std::filesystem::path& path,
@@ -54,6 +57,7 @@ struct RawHeights {
   std::size_t skip = 0;       ///< number of bytes before the first number
   Imath::V2d origin = Imath::V2d(0), spacing = Imath::V2d(1);
   std::optional<double> noData = {};  ///< number of missing samples; NaN is missing, too, if given
+  std::size_t maxMemory = kNoMemoryLimit;  ///< for files that cannot be mapped
 };
 
 /// Opens a file of numbers.

@@ -48,7 +48,8 @@ void TileFileTarget::writeAt(std::uint64_t offset, std::string_view bytes) {
     const ssize_t count =
         ::pwrite(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail("could not be written");
+    if (count == 0) errno = ENOSPC;
+    if (count <= 0) fail("could not be written");
     bytes.remove_prefix(static_cast<std::size_t>(count));
     offset += static_cast<std::uint64_t>(count);
   }
@@ -60,6 +61,7 @@ std::string TileFileTarget::read(std::uint64_t offset, std::size_t bytes) const 
     const ssize_t count =
         ::pread(descriptor_, read.data() + done, bytes - done, static_cast<off_t>(offset + done));
     if (count < 0 && errno == EINTR) continue;
+    if (count == 0) errno = EIO;  // another process has cut the file
     if (count <= 0) fail("could not be read again");
     done += static_cast<std::size_t>(count);
   }

@@ -44,14 +44,16 @@ class TileBytes {
     for (; value > 0x7f; value >>= 7) bytes_ += static_cast<char>((value & 0x7f) | 0x80);
     bytes_ += static_cast<char>(value);
   }
-  /// All lowest bytes of the numbers, then all second ones and so on.
-  template <typename T>
-  void planes(const std::vector<T>& numbers) {
-    for (std::size_t n = 0; n < sizeof(T); ++n)
-      for (const T value : numbers) bytes_ += static_cast<char>(value >> 8 * n & 0xff);
+  /// All lowest bytes of a number of each patch, then all second ones and so on.
+  template <typename NumberOf>
+  void planes(const std::vector<StoredPatch>& patches, const NumberOf& numberOf) {
+    for (std::size_t n = 0; n < sizeof(numberOf(patches[0])); ++n)
+      for (const StoredPatch& patch : patches)
+        bytes_ += static_cast<char>(numberOf(patch) >> 8 * n & 0xff);
   }
   void text(std::string_view text) { bytes_ += text; }
-  [[nodiscard]] const std::string& bytes() const { return bytes_; }
+  void reserve(std::size_t bytes) { bytes_.reserve(bytes); }
+  [[nodiscard]] std::string take() { return std::move(bytes_); }
 
  private:
   std::string bytes_;
@@ -129,10 +131,11 @@ void requireTileHeader(const TileHeader& header, std::size_t fileBytes) {
         fmt::format("the header states {}x{} samples in patches of {} cells, which is no "
                     "tiled terrain",
                     layout.columns, layout.rows, cells));
-  if (!(layout.spacing.x > 0 && layout.spacing.y > 0) ||
-      !std::isfinite(layout.origin.x + layout.columns * layout.spacing.x) ||
-      !std::isfinite(layout.origin.y + layout.rows * layout.spacing.y))
-    refuseTiles("the place of the terrain is not finite");
+  requireTileNumbers(layout.columns, layout.rows, cells);
+  requireGrid({.columns = layout.columns,
+               .rows = layout.rows,
+               .origin = layout.origin,
+               .spacing = layout.spacing});
   if (!(header.tolerance >= 0) || !std::isfinite(header.tolerance) ||
       header.step != heightStep(header.tolerance))
     refuseTiles(fmt::format("the tolerance is {}", header.tolerance));
@@ -220,6 +223,15 @@ void readRanges(TileReader& from, const std::vector<StoredPatch>& patches, bool 
 
 }  // namespace
 
+void requireTileNumbers(int columns, int rows, int cells) {
+  const auto patches = [&](int samples) { return std::ceil((samples - 1.0) / cells); };
+  if (patches(columns) * patches(rows) > std::numeric_limits<std::uint32_t>::max())
+    throw InvalidInput(fmt::format(
+        "the terrain has {}x{} samples in patches of {} cells, more than 2^32 patches; give more "
+        "cells",
+        columns, rows, cells));
+}
+
 std::uint64_t checksumOf(std::string_view bytes) {
   return XXH3_64bits(bytes.data(), bytes.size());
 }
@@ -241,12 +253,12 @@ std::string tileHeaderBytes(const TileHeader& header) {
   for (const std::uint64_t number : {header.fileBytes, header.indexOffset, header.indexBytes,
                                      header.indexLength, header.indexChecksum})
     to.number(number);
-  std::string bytes = to.bytes();
+  std::string bytes = to.take();
   bytes.resize(kTileHeaderBytes);
   bytes += name;
   TileBytes checksum;
   checksum.number(headerChecksum(bytes));
-  return bytes.replace(kChecksumAt, sizeof(std::uint64_t), checksum.bytes());
+  return bytes.replace(kChecksumAt, sizeof(std::uint64_t), checksum.take());
 }
 
 TileHeader parseTileHeader(std::string_view file) {
@@ -291,21 +303,26 @@ std::uint64_t tileHeaderChecksum(std::string_view file) {
 
 std::string tileIndexBytes(const TileIndex& index, const HeightPyramid& pyramid) {
   TileBytes to;
+  constexpr std::size_t kMostPatchBytes = 30;
+  std::size_t count = 0;
+  for (const std::vector<StoredPatch>& patches : index) count += patches.size();
+  to.reserve(count * kMostPatchBytes);
   for (std::size_t level = 0; level < index.size(); ++level) {
     writeRuns(to, index[level]);
-    std::vector<std::uint32_t> lowest, highest, errors;
-    std::vector<std::uint64_t> checksums;
-    for (const StoredPatch& stored : index[level]) {
-      const PyramidPatch& patch = pyramid.levels[level].patches[stored.number];
-      lowest.push_back(std::bit_cast<std::uint32_t>(patch.lowest));
-      highest.push_back(std::bit_cast<std::uint32_t>(patch.highest));
-      if (level > 0) errors.push_back(std::bit_cast<std::uint32_t>(patch.error));
-      checksums.push_back(stored.checksum);
-    }
-    to.planes(lowest);
-    to.planes(highest);
-    to.planes(errors);
-    to.planes(checksums);
+    const auto patchOf = [&](const StoredPatch& stored) -> const PyramidPatch& {
+      return pyramid.levels[level].patches[stored.number];
+    };
+    to.planes(index[level], [&](const StoredPatch& stored) {
+      return std::bit_cast<std::uint32_t>(patchOf(stored).lowest);
+    });
+    to.planes(index[level], [&](const StoredPatch& stored) {
+      return std::bit_cast<std::uint32_t>(patchOf(stored).highest);
+    });
+    if (level > 0)
+      to.planes(index[level], [&](const StoredPatch& stored) {
+        return std::bit_cast<std::uint32_t>(patchOf(stored).error);
+      });
+    to.planes(index[level], [](const StoredPatch& stored) { return stored.checksum; });
     std::uint64_t end = kTileHeaderBytes;
     for (const StoredPatch& stored : index[level]) {
       to.varying(stored.bytes);
@@ -313,7 +330,7 @@ std::string tileIndexBytes(const TileIndex& index, const HeightPyramid& pyramid)
       end = stored.offset + stored.bytes;
     }
   }
-  return to.bytes();
+  return to.take();
 }
 
 TileIndex parseTileIndex(std::string_view bytes, const TileHeader& header, HeightPyramid& pyramid) {

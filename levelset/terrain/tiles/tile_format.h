@@ -40,6 +40,10 @@ struct StoredPatch {
 /// Patches with data for each level, in the order of their numbers.
 using TileIndex = std::vector<std::vector<StoredPatch>>;
 
+/// Refuses a ground with more patches than numbers of 32 bits count.
+/// @throws InvalidInput
+void requireTileNumbers(int columns, int rows, int cells);
+
 /// XXH3 of the bytes, 64 bits.
 [[nodiscard]] std::uint64_t checksumOf(std::string_view bytes);
 

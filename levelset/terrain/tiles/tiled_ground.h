@@ -36,8 +36,8 @@ struct TiledGroundInfo {
 [[nodiscard]] TiledGroundInfo tiledGroundInfo(const std::filesystem::path& path,
                                               std::size_t maxMemory = kNoMemoryLimit);
 
-/// Hash of a tiled terrain file from its header, which covers the checksums of all parts. The other
-/// parts are not read.
+/// Hash of a tiled terrain file from its header, which covers the checksums of all parts. The index
+/// is read for its checksum, the heights are not.
 /// @throws as tiledGroundInfo()
 [[nodiscard]] std::uint64_t tiledGroundHash(const std::filesystem::path& path);
 

@@ -66,11 +66,15 @@ terrain::TileHeader tileHeaderOf(const HeightField& grid, const WriteTilesOption
   if (!(options.tolerance >= 0) || !std::isfinite(options.tolerance))
     throw UsageError(fmt::format("the tolerance of the heights is {}; give 0 or a positive number",
                                  options.tolerance));
+  requireGrid(grid);
   terrain::requirePyramid(grid.columns, grid.rows, options.cells);
+  terrain::requireTileNumbers(grid.columns, grid.rows, options.cells);
   const double patches = terrain::patchCount(grid.columns, grid.rows, options.cells);
-  // The strips of all levels, and as much again for their compressed patches.
+  // The strips of all levels, and as much again for their compressed patches. A patch has about 30
+  // bytes in the text of the index, and as much when it is compressed.
+  constexpr double kIndexBytes = 2 * 30;
   const double strips = 4.0 * (options.cells + 1) * grid.columns * sizeof(float);
-  requireMemory(patches * (sizeof(PyramidPatch) + 2 * sizeof(StoredPatch)) + strips +
+  requireMemory(patches * (sizeof(PyramidPatch) + sizeof(StoredPatch) + kIndexBytes) + strips +
                     PyramidErrors::memoryUse(grid.columns, grid.rows, options.cells),
                 memoryLeft(memoryLimit(options.maxMemory)));
   terrain::TileHeader header;
@@ -98,6 +102,9 @@ TileWriter::TileWriter(const std::filesystem::path& path, HeightRows& rows,
       file_(path) {
   for (std::size_t level = 0; level < pyramid_.levels.size(); ++level)
     strips_.emplace_back(static_cast<int>(level), layout_.columns, layout_.rows, options.cells);
+  // Growing lists would take twice the memory. Pages that are not used take none.
+  for (std::size_t level = 0; level < pyramid_.levels.size(); ++level)
+    index_[level].reserve(pyramid_.levels[level].patches.size());
 }
 
 TileWriter::Coded TileWriter::coded(const LevelStrip& strip, int column, double step) {
@@ -190,13 +197,15 @@ void TileWriter::takeRanges() {
 }
 
 /// Orders the patches of each level by number, and adds those whose samples are missing at their
-/// level but not at a finer one.
+/// level but not at a finer one. Level 0 has none of these.
 void TileWriter::sortIndex() {
   for (std::size_t level = 0; level < index_.size(); ++level) {
     std::vector<StoredPatch>& stored = index_[level];
     std::sort(stored.begin(), stored.end(),
               [](const StoredPatch& a, const StoredPatch& b) { return a.number < b.number; });
+    if (level == 0) continue;
     std::vector<StoredPatch> all;
+    all.reserve(pyramid_.levels[level].patches.size());
     std::size_t next = 0;
     const std::vector<PyramidPatch>& patches = pyramid_.levels[level].patches;
     for (std::size_t number = 0; number < patches.size(); ++number) {

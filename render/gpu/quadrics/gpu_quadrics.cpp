@@ -206,41 +206,12 @@ std::vector<std::uint32_t> wordsOf(const std::vector<StoredQuadric>& quadrics) {
 
 }  // namespace
 
-void GpuQuadrics::free(Uploaded& part) {
-  for (Texels& texels : part.textures) {
-    if (texels.texture != 0) releaseTexels(context_, texels);
-    texels = {};
-  }
-}
-
 void GpuQuadrics::release() {
-  for (Uploaded& part : uploaded_) free(part);
-  uploaded_.clear();
+  uploaded_.release();
   rays_.release(context_);
   fetched_.release(context_);
   if (program_ != 0) context_.gl().DeleteProgram(program_);
   program_ = 0;
-}
-
-const GpuQuadrics::Uploaded& GpuQuadrics::uploadedOf(
-    const std::shared_ptr<const QuadricTables>& tables) {
-  for (const Uploaded& part : uploaded_)
-    if (part.tables == tables) return part;
-  std::erase_if(uploaded_, [this](Uploaded& part) {
-    const bool isUnused = part.tables.use_count() == 1;
-    if (isUnused) free(part);
-    return isUnused;
-  });
-  Uploaded part;
-  part.tables = tables;
-  try {
-    upload(part);
-  } catch (...) {
-    free(part);
-    throw;
-  }
-  uploaded_.push_back(std::move(part));
-  return uploaded_.back();
 }
 
 void GpuQuadrics::upload(Uploaded& part) {
@@ -272,38 +243,19 @@ void GpuQuadrics::run(const Uploaded& part, std::vector<double>& rays) {
   const GlFunctions& gl = context_.gl();
   if (program_ == 0) program_ = compileCompute(context_, quadricShaderText());
   gl.UseProgram(program_);
-  const std::size_t count = rays.size() / kQuadricNumbers, bytes = rays.size() * sizeof(double);
-  rays_.upload(context_, rays);
-  fetched_.reserve(context_, bytes);
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, rays_.name());
   for (std::size_t n = 0; n < part.textures.size(); ++n)
     gl.BindTextureUnit(static_cast<GLuint>(n), part.textures[n].texture);
   const auto set = [&](const char* name, auto value) {
     gl.Uniform1i(gl.GetUniformLocation(program_, name), static_cast<GLint>(value));
   };
-  set("rayCount", count);
   set("boxCount", part.boxCount);
   set("firstStick", tables.firstStick());
   set("firstQuadric", tables.firstQuadric());
   const auto margin = static_cast<GLfloat>(tables.pad());
   gl.Uniform1fv(gl.GetUniformLocation(program_, "margin"), 1, &margin);
-  for (bool isDone = false; !isDone;) {
-    for (std::size_t first = 0; first < count; first += kQuadricRun) {
-      set("firstRay", first);
-      const std::size_t some = std::min(kQuadricRun, count - first);
-      gl.DispatchCompute(static_cast<GLuint>((some + kQuadricGroup - 1) / kQuadricGroup), 1, 1);
-      gl.Finish();
-    }
-    gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
-    gl.CopyNamedBufferSubData(rays_.name(), fetched_.name(), 0, 0, static_cast<GLsizeiptr>(bytes));
-    gl.MemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
-    gl.Finish();
-    context_.check("casting rays at quadrics");
-    std::memcpy(rays.data(), fetched_.mapped(), bytes);
-    isDone = true;
-    for (std::size_t n = 0; n < count && isDone; ++n)
-      isDone = rays[kQuadricNumbers * n + kNextBox] >= part.boxCount;
-  }
+  castUntilDone(context_, program_,
+                {kQuadricNumbers, kQuadricGroup, kQuadricRun, "casting rays at quadrics"}, rays_,
+                fetched_, rays, [&](const double* ray) { return ray[kNextBox] >= part.boxCount; });
 }
 
 std::vector<QuadricHit> GpuQuadrics::firstHits(const QuadricCaster& caster,
@@ -320,7 +272,8 @@ std::vector<QuadricHit> GpuQuadrics::firstHits(const QuadricCaster& caster,
                                    ray.far, start.value_or(ray.near), static_cast<double>(box),
                                    QuadricKernel::kNoRoot, static_cast<double>(INT32_MAX)});
   }
-  context_.run([&] { run(uploadedOf(caster.tables()), numbers); });
+  context_.run(
+      [&] { run(uploaded_.of(caster.tables(), [&](Uploaded& part) { upload(part); }), numbers); });
   std::vector<QuadricHit> hits(rays.size());
   for (std::size_t n = 0; n < rays.size(); ++n) {
     const double* found = numbers.data() + kQuadricNumbers * n;

@@ -9,6 +9,7 @@
 
 #include "render/gpu/device/gl_context.h"
 #include "render/gpu/device/gl_objects.h"
+#include "render/gpu/device/uploaded_tables.h"
 #include "render/quadrics/quadric_caster.h"
 
 namespace render {
@@ -21,7 +22,7 @@ class GpuQuadrics {
   /// @param context  must outlive this object
   /// @param largestTable  limit on the size of a buffer texture, bytes
   GpuQuadrics(const GlContext& context, std::size_t largestTable)
-      : context_(context), largestTable_(largestTable) {}
+      : context_(context), largestTable_(largestTable), uploaded_(context) {}
   GpuQuadrics(const GpuQuadrics&) = delete;
   GpuQuadrics& operator=(const GpuQuadrics&) = delete;
   /// Frees all objects in the context. Runs in a job of GlContext::run().
@@ -42,14 +43,12 @@ class GpuQuadrics {
   };
 
   // These run in jobs of GlContext::run().
-  void free(Uploaded& part);
-  const Uploaded& uploadedOf(const std::shared_ptr<const QuadricTables>& tables);
   void upload(Uploaded& part);
   void run(const Uploaded& part, std::vector<double>& rays);
 
   const GlContext& context_;
   std::size_t largestTable_;
-  std::vector<Uploaded> uploaded_;
+  UploadedTables<Uploaded> uploaded_;
   GrowingBuffer rays_{GrowingBuffer::Use::Upload}, fetched_{GrowingBuffer::Use::Fetch};
   GLuint program_ = 0;
 };

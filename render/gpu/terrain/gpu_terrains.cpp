@@ -19,9 +19,6 @@ constexpr int kTerrainGroup = 64;  // invocations of a work group
 constexpr std::size_t kTerrainRun = 1u << 16;
 constexpr std::size_t kTerrainNumbers = 15;  // numbers of a ray, which the shader updates
 constexpr std::size_t kWalkAt = 9;           // HeightWalk: level, i, j, t, column, halfRow
-// Steps of a walk in a call of the shader. Mesa's llvmpipe ends loops without notice after 65535
-// iterations of all loops of up to 16 rays.
-constexpr int kMostWalkSteps = 3000;
 
 constexpr const char* kTerrainDialect = R"GLSL(
 #define VAR precise double
@@ -91,47 +88,18 @@ std::string terrainShaderText() {
   return fmt::format(
              "#version 450 core\nlayout(local_size_x = {}) in;\n"
              "const int kNumbers = {}, kWalkAt = {}, kMostWalkSteps = {};\n",
-             kTerrainGroup, kTerrainNumbers, kWalkAt, kMostWalkSteps) +
+             kTerrainGroup, kTerrainNumbers, kWalkAt, GpuTerrains::kMostSteps) +
          kTerrainDialect + kHeightRaysKernel + kTerrainMain;
 }
 
 }  // namespace
 
-void GpuTerrains::free(Uploaded& part) {
-  for (Texels& texels : part.textures) {
-    if (texels.texture != 0) releaseTexels(context_, texels);
-    texels = {};
-  }
-}
-
 void GpuTerrains::release() {
-  for (Uploaded& part : uploaded_) free(part);
-  uploaded_.clear();
+  uploaded_.release();
   rays_.release(context_);
   fetched_.release(context_);
   if (program_ != 0) context_.gl().DeleteProgram(program_);
   program_ = 0;
-}
-
-const GpuTerrains::Uploaded& GpuTerrains::uploadedOf(
-    const std::shared_ptr<const TerrainTables>& tables) {
-  for (const Uploaded& part : uploaded_)
-    if (part.tables == tables) return part;
-  std::erase_if(uploaded_, [this](Uploaded& part) {
-    const bool isUnused = part.tables.use_count() == 1;
-    if (isUnused) free(part);
-    return isUnused;
-  });
-  Uploaded part;
-  part.tables = tables;
-  try {
-    upload(part);
-  } catch (...) {
-    free(part);
-    throw;
-  }
-  uploaded_.push_back(std::move(part));
-  return uploaded_.back();
 }
 
 void GpuTerrains::upload(Uploaded& part) {
@@ -154,16 +122,11 @@ void GpuTerrains::run(const Uploaded& part, std::vector<double>& rays) {
   const GlFunctions& gl = context_.gl();
   if (program_ == 0) program_ = compileCompute(context_, terrainShaderText());
   gl.UseProgram(program_);
-  const std::size_t count = rays.size() / kTerrainNumbers, bytes = rays.size() * sizeof(double);
-  rays_.upload(context_, rays);
-  fetched_.reserve(context_, bytes);
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, rays_.name());
   for (std::size_t n = 0; n < part.textures.size(); ++n)
     gl.BindTextureUnit(static_cast<GLuint>(n), part.textures[n].texture);
   const auto set = [&](const std::string& name, auto value) {
     gl.Uniform1i(gl.GetUniformLocation(program_, name.c_str()), static_cast<GLint>(value));
   };
-  set("rayCount", count);
   set("columns", tables.field->columns);
   set("cellsU", tables.cellsU);
   set("cellsV", tables.cellsV);
@@ -174,23 +137,9 @@ void GpuTerrains::run(const Uploaded& part, std::vector<double>& rays) {
   set("lastLeftOutV", tables.leftOut[3]);
   for (std::size_t level = 0; level < tables.firstNode.size(); ++level)
     set(fmt::format("firstNode[{}]", level), tables.firstNode[level]);
-  for (bool isDone = false; !isDone;) {
-    for (std::size_t first = 0; first < count; first += kTerrainRun) {
-      set("firstRay", first);
-      const std::size_t some = std::min(kTerrainRun, count - first);
-      gl.DispatchCompute(static_cast<GLuint>((some + kTerrainGroup - 1) / kTerrainGroup), 1, 1);
-      gl.Finish();
-    }
-    gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
-    gl.CopyNamedBufferSubData(rays_.name(), fetched_.name(), 0, 0, static_cast<GLsizeiptr>(bytes));
-    gl.MemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
-    gl.Finish();
-    context_.check("casting rays at a terrain");
-    std::memcpy(rays.data(), fetched_.mapped(), bytes);
-    isDone = true;
-    for (std::size_t n = 0; n < count && isDone; ++n)
-      isDone = rays[kTerrainNumbers * n + kWalkAt] > tables.topLevel;
-  }
+  castUntilDone(context_, program_,
+                {kTerrainNumbers, kTerrainGroup, kTerrainRun, "casting rays at a terrain"}, rays_,
+                fetched_, rays, [&](const double* ray) { return ray[kWalkAt] > tables.topLevel; });
 }
 
 std::vector<TerrainHit> GpuTerrains::firstHits(const TerrainCaster& caster,
@@ -206,7 +155,8 @@ std::vector<TerrainHit> GpuTerrains::firstHits(const TerrainCaster& caster,
                    {from.u, from.v, from.w, from.du, from.dv, from.dw, from.near, from.far,
                     from.pad, static_cast<double>(walk.level), 0, 0, walk.t, 0, 0});
   }
-  context_.run([&] { run(uploadedOf(caster.tables()), numbers); });
+  context_.run(
+      [&] { run(uploaded_.of(caster.tables(), [&](Uploaded& part) { upload(part); }), numbers); });
   std::vector<TerrainHit> hits(rays.size());
   for (std::size_t n = 0; n < rays.size(); ++n) {
     const double* found = numbers.data() + kTerrainNumbers * n + kWalkAt;

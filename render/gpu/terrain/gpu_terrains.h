@@ -9,6 +9,7 @@
 
 #include "render/gpu/device/gl_context.h"
 #include "render/gpu/device/gl_objects.h"
+#include "render/gpu/device/uploaded_tables.h"
 #include "render/terrain/rays/terrain_caster.h"
 
 namespace render {
@@ -18,10 +19,14 @@ namespace render {
 /// 754 requires. The nodes of the pyramid are visited in an order that needs no stack.
 class GpuTerrains {
  public:
+  /// Nodes that a ray visits in one call of the shader. Longer walks need several calls. Mesa's
+  /// llvmpipe ends loops without notice after 65535 iterations of all loops of up to 16 rays.
+  static constexpr int kMostSteps = 3000;
+
   /// @param context  must outlive this object
   /// @param largestTable  limit on the size of a buffer texture, bytes
   GpuTerrains(const GlContext& context, std::size_t largestTable)
-      : context_(context), largestTable_(largestTable) {}
+      : context_(context), largestTable_(largestTable), uploaded_(context) {}
   GpuTerrains(const GpuTerrains&) = delete;
   GpuTerrains& operator=(const GpuTerrains&) = delete;
   /// Frees all objects in the context. Runs in a job of GlContext::run().
@@ -41,14 +46,12 @@ class GpuTerrains {
   };
 
   // These run in jobs of GlContext::run().
-  void free(Uploaded& part);
-  const Uploaded& uploadedOf(const std::shared_ptr<const TerrainTables>& tables);
   void upload(Uploaded& part);
   void run(const Uploaded& part, std::vector<double>& rays);
 
   const GlContext& context_;
   std::size_t largestTable_;
-  std::vector<Uploaded> uploaded_;
+  UploadedTables<Uploaded> uploaded_;
   GrowingBuffer rays_{GrowingBuffer::Use::Upload}, fetched_{GrowingBuffer::Use::Fetch};
   GLuint program_ = 0;
 };

@@ -5,11 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
-#include <list>
 #include <string>
-#include <unordered_map>
-#include <utility>
 
 #include "levelset/error.h"
 #include "levelset/memory/memory_limit.h"
@@ -45,7 +41,8 @@ struct SlotPlace {
 /// Numbers of a camera for the shader, in world units relative to the eye.
 struct GroundView {
   V3d clipX, clipY, axis;
-  std::array<double, 2> shift{}, clipZ{}, clipW{}, depths{};
+  double shift = 0;
+  std::array<double, 2> clipZ{}, clipW{}, depths{};
 
   /// @param reach  range of depths of the ground, for parallel views
   GroundView(const Camera& camera, const std::array<double, 2>& reach, double spacing) {
@@ -65,7 +62,7 @@ struct GroundView {
       constexpr double kNearest = 1e-5;  // of the distance of samples
       clipZ = {std::max(camera.near, kNearest * spacing), 0};
       clipW = {0, 1};
-      shift = {2 * camera.axisShift / camera.width, 0};
+      shift = 2 * camera.axisShift / camera.width;
     }
   }
 };
@@ -236,7 +233,8 @@ class GlTerrainPainter final : public TerrainPainter {
                   const TerrainPaint& paint) {
     const GlFunctions& gl = context_.gl();
     const levelset::GroundLayout& layout = grid_.layout();
-    const GroundView view(camera, reachOf(selection, camera),
+    const GroundView view(camera,
+                          camera.orthoHeight ? reachOf(selection, camera) : std::array<double, 2>{},
                           std::min(layout.spacing.x, layout.spacing.y));
     const auto [column, row] = nearestSample(camera);
     const auto high = static_cast<float>(camera.from.z);
@@ -249,7 +247,8 @@ class GlTerrainPainter final : public TerrainPainter {
     set3("clipX", view.clipX);
     set3("clipY", view.clipY);
     set3("axis", view.axis);
-    set2("shift", view.shift);
+    const auto shift = static_cast<float>(view.shift);
+    gl.Uniform1fv(uniform("shift"), 1, &shift);
     set2("clipZ", view.clipZ);
     set2("clipW", view.clipW);
     set2("depths", view.depths);

@@ -28,7 +28,6 @@ struct TerrainPicture {
   /// For each pixel the unit normal, which points upwards, and the depth along the view axis, world
   /// units. Without ground, the depth is infinite.
   std::vector<Imath::V4f> surfaces;
-  [[nodiscard]] float depth(std::size_t pixel) const { return surfaces[pixel].w; }
 };
 
 /// Draws terrains as triangles with OpenGL, without a display. The heights of patches stay in the

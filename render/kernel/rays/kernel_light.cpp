@@ -98,16 +98,15 @@ std::vector<double> KernelScene::transmittances(const KernelTracer& tracer,
         light[i] = 0;
     }
   }
-  for (const QuadricPart& part : quadrics_)
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      if (light[i] >= kLeastTransmittance &&
-          part.caster.isOccluded({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance}))
-        light[i] = 0;
-  for (const TerrainPart& part : terrains_)
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      if (light[i] >= kLeastTransmittance &&
-          part.caster.isOccluded({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance}))
-        light[i] = 0;
+  const auto dimBy = [&](const auto& parts) {
+    for (const auto& part : parts)
+      for (std::size_t i = 0; i < rays.size(); ++i)
+        if (light[i] >= kLeastTransmittance &&
+            part.caster.isOccluded({rays[i].origin, rays[i].direction, 0, rays[i].maxDistance}))
+          light[i] = 0;
+  };
+  dimBy(quadrics_);
+  dimBy(terrains_);
   return light;
 }
 

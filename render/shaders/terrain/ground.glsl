@@ -11,7 +11,7 @@ uniform vec2 eyeHeight;  // height of the eye, as the sum of two numbers
 uniform vec3 clipX;      // x and y in clip space are products with these
 uniform vec3 clipY;
 uniform vec3 axis;       // view axis
-uniform vec2 shift;      // x in clip space gains shift.x × depth + shift.y
+uniform float shift;     // x in clip space gains shift × depth
 uniform vec2 clipZ;      // z in clip space is clipZ.x + clipZ.y × depth, likewise for w
 uniform vec2 clipW;
 uniform vec2 depths;     // visible range along the view axis
@@ -75,7 +75,7 @@ void main() {
                         (height - eyeHeight.x) - eyeHeight.y);
   precise float along = dot(axis, p);
   depth = along;
-  gl_Position = vec4(dot(clipX, p) + shift.x * along + shift.y, dot(clipY, p),
+  gl_Position = vec4(dot(clipX, p) + shift * along, dot(clipY, p),
                      clipZ.x + clipZ.y * along, clipW.x + clipW.y * along);
   gl_ClipDistance[0] = along - depths.x;
   gl_ClipDistance[1] = depths.y - along;

@@ -1,5 +1,6 @@
 #include "render/terrain/rays/terrain_caster.h"
 
+#include <Imath/ImathBoxAlgo.h>
 #include <fmt/core.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
@@ -71,13 +72,7 @@ V2d smoothSlope(const HeightField& field, int column, int row, bool isUpper, dou
 TerrainCaster::TerrainCaster(std::shared_ptr<const HeightField> field,
                              const TerrainOptions& options)
     : tables_(terrainTablesOf(std::move(field), options)), options_(options) {
-  const HeightField& heights = *tables_->field;
-  const Imath::Box3d own = heights.bounds();
-  for (int n = 0; n < 8 && !own.isEmpty(); ++n) {
-    const V3d corner((n & 1) != 0 ? own.max.x : own.min.x, (n & 2) != 0 ? own.max.y : own.min.y,
-                     (n & 4) != 0 ? own.max.z : own.min.z);
-    bounds_.extendBy(corner * options.transform);
-  }
+  if (!tables_->box.isEmpty()) bounds_ = Imath::transform(tables_->box, options.transform);
 }
 
 const HeightField& TerrainCaster::field() const {

@@ -28,17 +28,21 @@ Hit TerrainPart::hitOf(const Camera::Ray& ray, const TerrainHit& hit, std::size_
   return result;
 }
 
+void requireColour(const Imath::C3f& colour) {
+  for (int c = 0; c < 3; ++c)
+    if (!(colour[c] >= 0 && colour[c] <= 1))
+      throw levelset::InvalidInput(
+          fmt::format("the colour {}, {}, {} is out of range; give three numbers from 0 to 1",
+                      colour.x, colour.y, colour.z));
+}
+
 void requireRamp(const std::vector<HeightColour>& ramp) {
   for (std::size_t n = 0; n < ramp.size(); ++n) {
     const auto& [height, colour] = ramp[n];
     if (!std::isfinite(height) || (n > 0 && !(height > ramp[n - 1].height)))
       throw levelset::InvalidInput(fmt::format(
           "height {} of the colours is {}; give finite heights that increase", n + 1, height));
-    for (int c = 0; c < 3; ++c)
-      if (!(colour[c] >= 0 && colour[c] <= 1))
-        throw levelset::InvalidInput(
-            fmt::format("the colour {}, {}, {} is out of range; give three numbers from 0 to 1",
-                        colour.x, colour.y, colour.z));
+    requireColour(colour);
   }
 }
 

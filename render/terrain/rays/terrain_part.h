@@ -35,10 +35,12 @@ struct TerrainPart {
   [[nodiscard]] Hit hitOf(const Camera::Ray& ray, const TerrainHit& hit, std::size_t solid) const;
 };
 
+/// @throws levelset::InvalidInput for a colour outside [0, 1]
+void requireColour(const Imath::C3f& colour);
+
 /// Checks a list of colours.
-/// @throws levelset::InvalidInput for colours outside [0, 1], and for heights that are not finite
-/// or
-///         do not increase
+/// @throws levelset::InvalidInput for colours outside [0, 1], and for heights that do not increase
+///         or are not finite
 void requireRamp(const std::vector<HeightColour>& ramp);
 
 }  // namespace render

@@ -101,7 +101,9 @@ void setPlace(TerrainTables& tables, const Imath::M44d& transform) {
       if (!std::isfinite(transform[row][column]))
         throw InvalidInput("the transform of a terrain is not finite; give 16 finite numbers");
     if (transform[row][3] != (row == 3 ? 1 : 0))
-      throw InvalidInput("the last column of the transform is not 0, 0, 0, 1");
+      throw InvalidInput(
+          "the last column of the transform is not 0, 0, 0, 1; give these numbers there, and a "
+          "translation in the last row");
   }
   transform.multVecMatrix(V3d(field.origin.x, field.origin.y, 0), tables.origin);
   const double scales[3] = {field.spacing.x, field.spacing.y, 1};
@@ -120,17 +122,9 @@ void setPlace(TerrainTables& tables, const Imath::M44d& transform) {
 }
 
 /// Cells of one axis that lie in an interval with all their neighbours: the first and the last one.
-/// @param place  position of a sample
-template <typename Place>
-std::pair<int, int> cellsInside(double low, double high, int cells, const Place& place) {
-  const auto inside = [&](int sample) { return place(sample) >= low && place(sample) <= high; };
-  int first = 0, last = cells;  // samples, found by bisection
-  for (int step = static_cast<int>(std::bit_ceil(static_cast<unsigned>(cells))); step > 0;
-       step /= 2) {
-    if (first + step <= cells && place(first + step - 1) < low) first += step;
-    if (last - step >= 0 && place(last - step + 1) > high) last -= step;
-  }
-  if (!inside(first) || !inside(last)) return {0, -1};
+std::pair<int, int> cellsInside(double origin, double spacing, int cells, double low, double high) {
+  const auto [first, last] = levelset::samplesBetween(origin, spacing, cells + 1, low, high);
+  if (first > last) return {0, -1};
   return {first == 0 ? 0 : first + 1, last == cells ? cells - 1 : last - 2};
 }
 
@@ -140,12 +134,13 @@ void leaveOut(TerrainTables& tables, const Imath::Box3d& box) {
     throw InvalidInput(
         "the box of the ground that is left out is empty; give its lower corner first");
   const auto [firstU, lastU] =
-      cellsInside(box.min.x, box.max.x, tables.cellsU,
-                  [&field](int sample) { return field.position(sample, 0).x; });
+      cellsInside(field.origin.x, field.spacing.x, tables.cellsU, box.min.x, box.max.x);
   const auto [firstV, lastV] =
-      cellsInside(box.min.y, box.max.y, tables.cellsV,
-                  [&field](int sample) { return field.position(0, sample).y; });
-  if (lastU < firstU || lastV < firstV) return;
+      cellsInside(field.origin.y, field.spacing.y, tables.cellsV, box.min.y, box.max.y);
+  if (lastU < firstU || lastV < firstV)
+    throw InvalidInput(
+        "the box of the ground that is left out contains no cell with all its neighbours; give one "
+        "over the terrain, at least three cells wide");
   tables.leftOut = {firstU, lastU, firstV, lastV};
   const HeightRange range = samplesIn(field, firstU, lastU + 1, firstV, lastV + 1);
   if (range.low > range.high) return;
@@ -221,12 +216,10 @@ TerrainTables makeTerrainTables(std::shared_ptr<const HeightField> field,
   levelset::requireMemory(static_cast<double>(numbers * sizeof(float)), maxBytes);
   tables.ranges.resize(numbers);
   fillPyramid(tables);
-  HeightRange all;
-  for (const float height : tables.field->heights)
-    if (!std::isnan(height)) all.add({height, height});
-  if (all.low <= all.high) {
-    tables.lowest = all.low;
-    tables.highest = all.high;
+  tables.box = tables.field->bounds();
+  if (!tables.box.isEmpty()) {
+    tables.lowest = static_cast<float>(tables.box.min.z);
+    tables.highest = static_cast<float>(tables.box.max.z);
   }
   return tables;
 }

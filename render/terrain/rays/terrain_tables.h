@@ -23,6 +23,7 @@ struct TerrainTables {
   std::vector<float> ranges = {};            ///< lowest and highest known height of each node
   std::vector<std::size_t> firstNode = {0};  ///< first node of each level
   int cellsU = 0, cellsV = 0, topLevel = 0;
+  Imath::Box3d box = {};  ///< of the known samples, in the positions of the field
   /// First and last column, first and last row of the cells that are left out.
   std::array<int, 4> leftOut = {0, -1, 0, -1};
   float lowest = 0, highest = 0;  ///< heights of all known samples

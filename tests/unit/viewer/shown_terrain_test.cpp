@@ -66,6 +66,7 @@ TEST(ShownTerrain, IsReadDrawnAndPicked) {
       const auto picked = pick(*frame, x, y);
       if (!picked) continue;
       ++hits;
+      EXPECT_EQ(frame->image->channels.at("A")[static_cast<std::size_t>(120 * y + x)], 1);
       EXPECT_NEAR(picked->position.z, 0.5 * picked->position.x, 0.1);
       EXPECT_LT((picked->normal - V3d(-0.5, 0, 1).normalized()).length(), support::rounding(8));
     }

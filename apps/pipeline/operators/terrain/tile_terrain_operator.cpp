@@ -23,6 +23,8 @@ std::vector<Param> rawHeightParams() {
   std::vector<Param> params;
   for (Param& param : volumeFileParams())
     if (param.name != "frame") params.push_back(std::move(param));
+  for (Param& param : params)
+    if (param.name == "type") std::erase(param.choices, "f16");  // heights have no use for it
   params.push_back({.name = "no-data",
                     .type = ParamType::Number,
                     .doc = "for .raw: samples of this height have no data"});
@@ -47,7 +49,8 @@ levelset::RawHeights rawHeights(const Invocation& in) {
                            .isNorthFirst = in.flag("flip"),
                            .skip = layout.skip,
                            .origin = {layout.origin.x, layout.origin.y},
-                           .spacing = {layout.spacing.x, layout.spacing.y}};
+                           .spacing = {layout.spacing.x, layout.spacing.y},
+                           .maxMemory = in.maxMemory};
   if (in.given("no-data")) raw.noData = in.number("no-data");
   return raw;
 }
@@ -72,7 +75,7 @@ Value tileTerrain(Invocation& in) {
 void validateTiling(const Invocation& in) {
   const std::string name = formatName(in);
   const bool isRaw = levelset::isRawFormat(name);
-  if (!isRaw && !levelset::isHeightFormat(name))
+  if (!isRaw && !levelset::isRowFormat(name))
     throw UsageError(fmt::format(
         "tile-terrain: '{}' is of no format that is read by rows; use asc, hgt, flt, bil or raw",
         name));
@@ -104,7 +107,7 @@ Operator tileTerrainOperator() {
       .group = "Terrain",
       .summary = "convert a terrain of any size into a tiled file (lst), row by row",
       .details =
-          "The terrain is never in memory as a whole: it takes about four rows of patches, and 50 "
+          "The terrain is never in memory as a whole: it takes about four rows of patches, and 100 "
           "bytes for each patch. The file has the patches of all levels of a pyramid, their ranges "
           "and errors. 'read' reads it, or a part of it with --box and --level. With --tolerance, "
           "each stored height is within the tolerance of the true one, and the tolerance is part "

@@ -113,12 +113,24 @@ TEST_F(TiledTerrain, TileTerrainRefusesOtherFiles) {
   writeFile("a.raw", "123456");
   expectRefusal("tile-terrain ground.asc b.asc", 2, "ends in .lst");
   expectRefusal("tile-terrain ground.ply b.lst", 2, "no format that is read by rows");
+  expectRefusal("tile-terrain ground.tif b.lst", 2, "no format that is read by rows");
   expectRefusal("tile-terrain a.raw b.lst", 2, "give --size and --type");
   expectRefusal("tile-terrain a.raw b.lst --size 3,1,2 --type u8", 2, "has 2 layers");
   expectRefusal("tile-terrain a.raw b.lst --size 3,3,1 --type u8", 3, "9 follow from its size");
-  expectRefusal("tile-terrain a.raw b.lst --size 3,2,1 --type f16", 2, "'f16' are not supported");
+  expectRefusal("tile-terrain a.raw b.lst --size 3,2,1 --type f16", 2, "'f16' is not one of u8");
   expectRefusal("tile-terrain ground.asc b.lst --flip", 2, "--flip describes a .raw file");
   expectRefusal("tile-terrain none.asc b.lst", 6, "none.asc");
+  // A place that no reader accepts is refused before an old file is replaced.
+  ASSERT_EQ(levelsmith("tile-terrain ground.asc old.lst").code, 0);
+  const std::string old = support::readText(folder_ / "old.lst");
+  writeFile(
+      "far.asc", "ncols 100\nnrows 2\nxllcorner 1e308\nyllcorner 0\ncellsize 1e307\n" + [] {
+        std::string heights;
+        for (int n = 0; n < 200; ++n) heights += "0 ";
+        return heights;
+      }());
+  expectRefusal("tile-terrain far.asc old.lst", 3, "not finite");
+  EXPECT_EQ(support::readText(folder_ / "old.lst"), old);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "b.lst"));
 }
 

@@ -111,6 +111,26 @@ TEST_F(RawHeightRows, TakePlaceAndMissingSamples) {
   EXPECT_EQ(field.spacing, Imath::V2d(2, 3));
 }
 
+/// Marks are compared with the numbers of the file, since floats hold 24 bits only.
+TEST_F(RawHeightRows, CompareMarksBeforeRounding) {
+  const auto missing = [&](const std::string& bytes, int columns, const char* type, double mark) {
+    return read(bytes, {.columns = columns, .rows = 1, .type = type, .noData = mark})
+        .missingCount();
+  };
+  EXPECT_EQ(missing(bytesOf<std::int32_t>({16777216, 16777217}, false), 2, "i32", 16777217), 1u);
+  EXPECT_EQ(missing(bytesOf<std::uint32_t>({4294967295.0, 4294967294.0, 7}, false), 3, "u32",
+                    4294967295.0),
+            1u);
+  EXPECT_EQ(missing(bytesOf<double>({-9999, -9999.0001}, false), 2, "f64", -9999), 1u);
+  EXPECT_EQ(missing(bytesOf<float>({0.1, 1}, false), 2, "f32", 0.1), 1u);
+  // NaN is missing if a mark is given.
+  EXPECT_EQ(missing(bytesOf<float>({NAN, -9999, 1}, false), 3, "f32", -9999), 2u);
+  EXPECT_SAYS(refusal<InvalidInput>([&] {
+                read(bytesOf<float>({1, NAN}, false), {.columns = 2, .rows = 1, .type = "f32"});
+              }),
+              "column 2 is nan; repair it, or give the number of missing samples");
+}
+
 TEST_F(RawHeightRows, RefuseOtherSizesAndTypes) {
   EXPECT_SAYS(
       refusal<InvalidInput>([&] { read("12345", {.columns = 3, .rows = 2, .type = "u8"}); }),

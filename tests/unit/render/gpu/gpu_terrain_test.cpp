@@ -87,8 +87,8 @@ levelset::TriMesh shifted(levelset::TriMesh mesh, const V3d& by) {
 }
 
 /// Depths of pixels are those of rays with the same triangles in double precision, at the origin
-/// and 10^6 and 10^7 units away from it. Pixels whose neighbours have other depths are left out:
-/// there, the ray may pass beside an edge.
+/// and 10^6 and 3 × 10^7 units away from it. Pixels whose neighbours have other depths are left
+/// out: there, the ray may pass beside an edge.
 TEST(GpuTerrain, HasTheDepthsOfRays) {
   for (const V3d& middle : {V3d(0), V3d(1e6, -1e6, 0), V3d(-3e7, 2e7, 500)}) {
     Land land(middle);
@@ -116,8 +116,9 @@ TEST(GpuTerrain, HasTheDepthsOfRays) {
           const Camera::Ray ray = views.at(x + 0.5, y + 0.5);
           const Hit hit = rays.intersect(ray.origin - camera.from, ray.direction, 0, 1e9);
           const std::size_t pixel = static_cast<std::size_t>(y * camera.width + x);
-          const double depth = static_cast<double>(picture.depth(pixel)),
-                       across = std::abs(static_cast<double>(picture.depth(pixel + 1)) - depth);
+          const double depth = static_cast<double>(picture.surfaces[pixel].w),
+                       across =
+                           std::abs(static_cast<double>(picture.surfaces[pixel + 1].w) - depth);
           if (across > 0.02 * depth) continue;
           ++compared;
           const double error = std::abs(hit.distance * ray.direction.dot(views.axis()) - depth);

@@ -11,6 +11,7 @@
 #include "render/cpu/cpu_renderer.h"
 #include "render/gpu/gpu_renderer.h"
 #include "render/scene/scene.h"
+#include "render/terrain/rays/terrain_tables.h"
 #include "tests/support/terrain_rays.h"
 
 namespace gpu_terrains_test {
@@ -89,6 +90,14 @@ TEST(GpuTerrains, FindRaysThatVisitManyNodes) {
   for (int n = 0; n < 40; ++n)
     rays.push_back({V3d(-760, -740 + n, 0.9999), V3d(1, 0.7 + 0.005 * n, 0).normalized()});
   expectSameBits(device, caster, rays);
+  int longer = 0;
+  for (const Camera::Ray& ray : rays) {
+    HeightKernel kernel = caster.tables()->kernel();
+    HeightKernel::HeightWalk walk = caster.tables()->start();
+    kernel.walkHeights(caster.tables()->gridRay(ray), false, GpuTerrains::kMostSteps, walk);
+    longer += walk.level <= caster.tables()->topLevel;
+  }
+  EXPECT_GT(longer, 0);
 }
 
 TEST(GpuTerrains, DrawThePictureOfTheProcessor) {

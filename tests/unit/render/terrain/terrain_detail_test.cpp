@@ -14,7 +14,6 @@
 #include "levelset/terrain/ground_mesh.h"
 #include "render/terrain/resident_patches.h"
 #include "tests/support/drawn_terrain.h"
-#include "tests/support/files.h"
 #include "tests/support/measured.h"
 #include "tests/support/terrain_stores.h"
 #include "tests/support/threads.h"
