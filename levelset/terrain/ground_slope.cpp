@@ -7,10 +7,10 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "levelset/error.h"
 #include "levelset/memory/memory_limit.h"
-#include "levelset/progress_gate.h"
 
 namespace levelset {
 namespace {
@@ -50,20 +50,39 @@ std::optional<Imath::V2d> hornGradient(const HeightField& field, int column, int
   return gradient;
 }
 
-/// Calls `set(index, gradient)` for all samples with a gradient.
-template <typename Set>
-void forEachGradient(const HeightField& field, bool edges, const Progress& progress,
-                     const Set& set) {
+/// Rows that several threads compute at once.
+constexpr int kSlopeRows = 64;
+
+/// Replaces each height by a figure of its gradient, or by a missing height. Rows that are replaced
+/// are kept as long as the next ones need them.
+/// @param figureOf  gets the gradient; kMissingHeight: none
+template <typename Figure>
+HeightField replacedByFigures(HeightField field, const SlopeOptions& options,
+                              const Figure& figureOf) {
   requireHeights(field);
   requireLengths(field);
-  ProgressGate gate(progress, static_cast<std::size_t>(field.rows));
-  tbb::parallel_for(0, field.rows, [&](int row) {
-    for (int column = 0; column < field.columns; ++column)
-      if (const auto gradient = hornGradient(field, column, row, edges))
-        set(field.index(column, row), *gradient);
-    gate.advance(1);
-  });
-  report(progress, 1);
+  const auto width = static_cast<std::ptrdiff_t>(field.columns);
+  HeightField band{.columns = field.columns, .spacing = field.spacing};
+  std::vector<float> before;  // the row below the band
+  for (int first = 0; first < field.rows; first += kSlopeRows) {
+    const int end = std::min(first + kSlopeRows, field.rows),
+              lastKept = std::min(end, field.rows - 1);
+    band.heights = before;
+    band.heights.insert(band.heights.end(), field.heights.begin() + first * width,
+                        field.heights.begin() + (lastKept + 1) * width);
+    const int below = before.empty() ? 0 : 1;
+    band.rows = lastKept - first + 1 + below;
+    before.assign(field.heights.begin() + (end - 1) * width, field.heights.begin() + end * width);
+    tbb::parallel_for(first, end, [&](int row) {
+      for (int column = 0; column < field.columns; ++column) {
+        const auto gradient = hornGradient(band, column, row - first + below, options.edges);
+        field.heights[field.index(column, row)] = gradient ? figureOf(*gradient) : kMissingHeight;
+      }
+    });
+    report(options.progress, static_cast<double>(end) / field.rows);
+  }
+  field.noData.reset();
+  return field;
 }
 
 void requireSampleMemory(const HeightField& field, std::size_t bytes, std::size_t maxMemory) {
@@ -71,42 +90,35 @@ void requireSampleMemory(const HeightField& field, std::size_t bytes, std::size_
                 memoryLeft(memoryLimit(maxMemory)));
 }
 
-/// Field of another figure at the same samples, all missing.
-HeightField missingLike(const HeightField& field, std::size_t maxMemory) {
-  requireSampleMemory(field, sizeof(float), maxMemory);
-  return {.columns = field.columns,
-          .rows = field.rows,
-          .origin = field.origin,
-          .spacing = field.spacing,
-          .heights = std::vector<float>(field.heights.size(), kMissingHeight),
-          .coordinateSystem = field.coordinateSystem};
-}
-
 }  // namespace
 
+HeightField slopeDegrees(HeightField&& field, const SlopeOptions& options) {
+  return replacedByFigures(std::move(field), options, [](const Imath::V2d& gradient) {
+    return static_cast<float>(std::atan(std::hypot(gradient.x, gradient.y)) * kDegreesOfRadian);
+  });
+}
+
 HeightField slopeDegrees(const HeightField& field, const SlopeOptions& options) {
-  HeightField result = missingLike(field, options.maxMemory);
-  forEachGradient(
-      field, options.edges, options.progress, [&](std::size_t n, const Imath::V2d& gradient) {
-        result.heights[n] =
-            static_cast<float>(std::atan(std::hypot(gradient.x, gradient.y)) * kDegreesOfRadian);
-      });
-  return result;
+  requireSampleMemory(field, sizeof(float), options.maxMemory);
+  return slopeDegrees(HeightField(field), options);
+}
+
+HeightField aspectDegrees(HeightField&& field, const SlopeOptions& options) {
+  return replacedByFigures(std::move(field), options, [](const Imath::V2d& gradient) {
+    if (gradient == Imath::V2d(0)) return kMissingHeight;
+    const double angle = std::atan2(-gradient.x, -gradient.y) * kDegreesOfRadian;
+    const auto rounded = static_cast<float>(angle < 0 ? angle + 360 : angle);
+    return rounded < 360 ? rounded : 0;
+  });
 }
 
 HeightField aspectDegrees(const HeightField& field, const SlopeOptions& options) {
-  HeightField result = missingLike(field, options.maxMemory);
-  forEachGradient(field, options.edges, options.progress,
-                  [&](std::size_t n, const Imath::V2d& gradient) {
-                    if (gradient == Imath::V2d(0)) return;
-                    const double angle = std::atan2(-gradient.x, -gradient.y) * kDegreesOfRadian;
-                    const auto rounded = static_cast<float>(angle < 0 ? angle + 360 : angle);
-                    result.heights[n] = rounded < 360 ? rounded : 0;
-                  });
-  return result;
+  requireSampleMemory(field, sizeof(float), options.maxMemory);
+  return aspectDegrees(HeightField(field), options);
 }
 
-std::vector<std::uint8_t> hillshade(const HeightField& field, const HillshadeOptions& options) {
+void forEachShadedRow(const HeightField& field, const HillshadeOptions& options,
+                      const std::function<void(std::span<const std::uint8_t>)>& take) {
   if (!std::isfinite(options.azimuthDegrees))
     throw UsageError(
         fmt::format("the azimuth is {} degrees; give a finite angle", options.azimuthDegrees));
@@ -120,15 +132,39 @@ std::vector<std::uint8_t> hillshade(const HeightField& field, const HillshadeOpt
                altitude = options.altitudeDegrees / kDegreesOfRadian;
   const double lightX = std::sin(azimuth) * std::cos(altitude),
                lightY = std::cos(azimuth) * std::cos(altitude), lightZ = std::sin(altitude);
+  requireHeights(field);
+  requireLengths(field);
+  const auto shadeOf = [&](const Imath::V2d& gradient) {
+    const Imath::V2d slope = gradient * options.exaggeration;
+    const double cosine = (lightZ - lightX * slope.x - lightY * slope.y) /
+                          std::sqrt(1 + slope.x * slope.x + slope.y * slope.y);
+    return static_cast<std::uint8_t>(std::lround(1 + 254 * std::clamp(cosine, 0.0, 1.0)));
+  };
+  const auto width = static_cast<std::size_t>(field.columns);
+  std::vector<std::uint8_t> shades(width * kSlopeRows);
+  for (int end = field.rows; end > 0; end -= kSlopeRows) {
+    const int first = std::max(0, end - kSlopeRows);
+    tbb::parallel_for(first, end, [&](int row) {
+      for (int column = 0; column < field.columns; ++column) {
+        const auto gradient = hornGradient(field, column, row, options.edges);
+        shades[static_cast<std::size_t>(row - first) * width + static_cast<std::size_t>(column)] =
+            gradient ? shadeOf(*gradient) : std::uint8_t{0};
+      }
+    });
+    for (int row = end - 1; row >= first; --row)
+      take({shades.data() + static_cast<std::size_t>(row - first) * width, width});
+    report(options.progress, 1 - static_cast<double>(first) / field.rows);
+  }
+}
+
+std::vector<std::uint8_t> hillshade(const HeightField& field, const HillshadeOptions& options) {
   requireSampleMemory(field, sizeof(std::uint8_t), options.maxMemory);
-  std::vector<std::uint8_t> shades(field.heights.size(), 0);
-  forEachGradient(
-      field, options.edges, options.progress, [&](std::size_t n, const Imath::V2d& gradient) {
-        const Imath::V2d slope = gradient * options.exaggeration;
-        const double cosine = (lightZ - lightX * slope.x - lightY * slope.y) /
-                              std::sqrt(1 + slope.x * slope.x + slope.y * slope.y);
-        shades[n] = static_cast<std::uint8_t>(std::lround(1 + 254 * std::clamp(cosine, 0.0, 1.0)));
-      });
+  std::vector<std::uint8_t> shades(field.heights.size());
+  auto end = shades.end();
+  forEachShadedRow(field, options, [&](std::span<const std::uint8_t> row) {
+    end -= field.columns;
+    std::copy(row.begin(), row.end(), end);
+  });
   return shades;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <vector>
 
 #include "levelset/terrain/height_field.h"
@@ -30,10 +32,13 @@ struct SlopeOptions {
 /// @throws InvalidInput for a field in degrees, or one that requireHeights() refuses
 /// @throws ResourceLimit, Cancelled
 [[nodiscard]] HeightField slopeDegrees(const HeightField& field, const SlopeOptions& options = {});
+/// The same in the memory of the field.
+[[nodiscard]] HeightField slopeDegrees(HeightField&& field, const SlopeOptions& options = {});
 
 /// Direction in which the ground falls, degrees clockwise from north (y), from 0 to 360 without
 /// 360. Samples where the ground is level are missing, too. @throws as slopeDegrees
 [[nodiscard]] HeightField aspectDegrees(const HeightField& field, const SlopeOptions& options = {});
+[[nodiscard]] HeightField aspectDegrees(HeightField&& field, const SlopeOptions& options = {});
 
 struct HillshadeOptions {
   double azimuthDegrees = 315;  ///< direction of the light, clockwise from north
@@ -50,5 +55,10 @@ struct HillshadeOptions {
 /// @throws InvalidInput, ResourceLimit, Cancelled as slopeDegrees
 [[nodiscard]] std::vector<std::uint8_t> hillshade(const HeightField& field,
                                                   const HillshadeOptions& options = {});
+
+/// Passes the rows of hillshade() on, from the north. @throws as hillshade(), and what `take`
+/// throws
+void forEachShadedRow(const HeightField& field, const HillshadeOptions& options,
+                      const std::function<void(std::span<const std::uint8_t>)>& take);
 
 }  // namespace levelset

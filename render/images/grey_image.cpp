@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <png.h>
 
+#include <cassert>
 #include <cerrno>
 #include <csetjmp>
 #include <cstdio>
@@ -70,45 +71,6 @@ struct PngReader {
  private:
   static void fail(png_structp png, png_const_charp message) {
     static_cast<PngReader*>(png_get_error_ptr(png))->error = message;
-    png_longjmp(png, 1);
-  }
-  static void ignore(png_structp, png_const_charp) {}
-};
-
-/// State of libpng while it writes; errors are those of PngReader.
-struct PngWriter {
-  png_structp png = nullptr;
-  png_infop info = nullptr;
-  std::string error;
-
-  PngWriter() {
-    png = png_create_write_struct(PNG_LIBPNG_VER_STRING, this, &fail, &ignore);
-    if (png) info = png_create_info_struct(png);
-  }
-  ~PngWriter() { png_destroy_write_struct(&png, &info); }
-  PngWriter(const PngWriter&) = delete;
-  PngWriter& operator=(const PngWriter&) = delete;
-
-  bool write(std::FILE* file, int width, int height, const std::uint8_t* topRow,
-             std::ptrdiff_t rowStep, bool zeroIsClear) {
-    if (setjmp(png_jmpbuf(png))) return false;
-    png_init_io(png, file);
-    png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
-                 PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
-                 PNG_FILTER_TYPE_DEFAULT);
-    // The grey of pictures with smooth shades is near that of the pixel above.
-    png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
-    const png_color_16 clear = {};
-    if (zeroIsClear) png_set_tRNS(png, info, nullptr, 1, &clear);
-    png_write_info(png, info);
-    for (int row = 0; row < height; ++row) png_write_row(png, topRow + row * rowStep);
-    png_write_end(png, nullptr);
-    return true;
-  }
-
- private:
-  static void fail(png_structp png, png_const_charp message) {
-    static_cast<PngWriter*>(png_get_error_ptr(png))->error = message;
     png_longjmp(png, 1);
   }
   static void ignore(png_structp, png_const_charp) {}
@@ -212,31 +174,89 @@ GreyImage readGreyPng(const std::filesystem::path& path, std::size_t maxMemory) 
   return image;
 }
 
-void writeGreyPng(const std::filesystem::path& path, int width, int height,
-                  const std::uint8_t* topRow, std::ptrdiff_t rowStep, bool zeroIsClear) {
+/// Also the state of libpng while it writes; errors are those of PngReader.
+struct GreyPngWriter::State {
+  State(const std::filesystem::path& path, int wide)
+      : name(path.string()), width(wide), target(path) {
+    png = png_create_write_struct(PNG_LIBPNG_VER_STRING, this, &keepError, &ignore);
+    if (png) info = png_create_info_struct(png);
+  }
+  ~State() { png_destroy_write_struct(&png, &info); }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  bool begin(int height, bool zeroIsClear) {
+    if (setjmp(png_jmpbuf(png))) return false;
+    png_init_io(png, file.get());
+    png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
+                 PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    // The grey of pictures with smooth shades is near that of the pixel above.
+    png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
+    const png_color_16 clear = {};
+    if (zeroIsClear) png_set_tRNS(png, info, nullptr, 1, &clear);
+    png_write_info(png, info);
+    return true;
+  }
+  bool addRow(const std::uint8_t* row) {
+    if (setjmp(png_jmpbuf(png))) return false;
+    png_write_row(png, row);
+    return true;
+  }
+  bool end() {
+    if (setjmp(png_jmpbuf(png))) return false;
+    png_write_end(png, nullptr);
+    return true;
+  }
+
+  [[noreturn]] void fail(const std::string& why) const {
+    throw IoError(fmt::format("{}: {}; free some space or choose another folder", name, why));
+  }
+
+  std::string name;
+  int width;
+  levelset::FileTarget target;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file{nullptr, &std::fclose};
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  std::string error;
+
+ private:
+  static void keepError(png_structp png, png_const_charp message) {
+    static_cast<State*>(png_get_error_ptr(png))->error = message;
+    png_longjmp(png, 1);
+  }
+  static void ignore(png_structp, png_const_charp) {}
+};
+
+GreyPngWriter::GreyPngWriter(const std::filesystem::path& path, int width, int height,
+                             bool zeroIsClear) {
   constexpr int kMostPixels = 1'000'000;  // of libpng, along a side
   if (width > kMostPixels || height > kMostPixels)
     throw InvalidInput(
         fmt::format("a picture of {}x{} pixels is larger than {}, the limit of PNG "
                     "files; crop it, or use fewer samples",
                     width, height, kMostPixels));
-  levelset::FileTarget target(path);
-  const auto fail = [&](const std::string& why) {
-    throw IoError(
-        fmt::format("{}: {}; free some space or choose another folder", path.string(), why));
-  };
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(target.path().c_str(), "wb"),
-                                                       &std::fclose);
-  if (!file) fail(std::strerror(errno));
-  {
-    PngWriter writer;
-    if (!writer.png || !writer.info)
-      throw levelset::ResourceLimit(
-          fmt::format("libpng cannot allocate memory to write {}; free memory", path.string()));
-    if (!writer.write(file.get(), width, height, topRow, rowStep, zeroIsClear)) fail(writer.error);
-  }
-  if (std::fclose(file.release()) != 0) fail(std::strerror(errno));
-  target.commit();
+  state_ = std::make_unique<State>(path, width);
+  state_->file.reset(std::fopen(state_->target.path().c_str(), "wb"));
+  if (!state_->file) state_->fail(std::strerror(errno));
+  if (!state_->png || !state_->info)
+    throw levelset::ResourceLimit(
+        fmt::format("libpng cannot allocate memory to write {}; free memory", state_->name));
+  if (!state_->begin(height, zeroIsClear)) state_->fail(state_->error);
+}
+
+GreyPngWriter::~GreyPngWriter() = default;
+
+void GreyPngWriter::add(std::span<const std::uint8_t> pixels) {
+  assert(pixels.size() == static_cast<std::size_t>(state_->width));
+  if (!state_->addRow(pixels.data())) state_->fail(state_->error);
+}
+
+void GreyPngWriter::commit() {
+  if (!state_->end()) state_->fail(state_->error);
+  if (std::fclose(state_->file.release()) != 0) state_->fail(std::strerror(errno));
+  state_->target.commit();
 }
 
 }  // namespace render

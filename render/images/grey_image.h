@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "levelset/progress.h"
@@ -24,16 +26,27 @@ struct GreyImage {
 [[nodiscard]] GreyImage readGreyPng(const std::filesystem::path& path,
                                     std::size_t maxMemory = levelset::kNoMemoryLimit);
 
-/// Writes a grey PNG of 8 bits.
-/// @param topRow      first pixel of the top row
-/// @param rowStep     distance from a row to the one below, pixels; negative if the bottom row is
-/// the
-///                    first one in memory
-/// @param zeroIsClear pixels of 0 are transparent
-/// @throws InvalidInput for more than a million pixels along a side
-/// @throws IoError when the file cannot be written; an old file of that name stays then
-void writeGreyPng(const std::filesystem::path& path, int width, int height,
-                  const std::uint8_t* topRow, std::ptrdiff_t rowStep, bool zeroIsClear);
+/// Writes a grey PNG of 8 bits, row by row from the top. Without commit(), an old file of that name
+/// stays.
+class GreyPngWriter {
+ public:
+  /// @param zeroIsClear  pixels of 0 are transparent
+  /// @throws levelset::InvalidInput for more than a million pixels along a side
+  /// @throws levelset::IoError when the file cannot be written, as the other functions
+  GreyPngWriter(const std::filesystem::path& path, int width, int height, bool zeroIsClear);
+  ~GreyPngWriter();
+  GreyPngWriter(const GreyPngWriter&) = delete;
+  GreyPngWriter& operator=(const GreyPngWriter&) = delete;
+
+  /// @param pixels  as many as the width
+  void add(std::span<const std::uint8_t> pixels);
+  /// Completes the file, after the last row.
+  void commit();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// Checks that the chunks of a PNG lie within the file, because libpng allocates memory for any
 /// chunk size that a file claims. Does nothing for a pipe.

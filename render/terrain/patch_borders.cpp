@@ -18,12 +18,12 @@ struct PatchVertex {
 /// those of the wider triangle.
 PatchVertex keptVertex(PatchVertex v, int cells, unsigned coarserSides) {
   if (v.column % 2 == 1) {
-    if (v.row == 0 && (coarserSides & kSouth)) ++v.column;
-    if (v.row == cells && (coarserSides & kNorth)) --v.column;
+    if (v.row == 0 && (coarserSides & SouthSide)) ++v.column;
+    if (v.row == cells && (coarserSides & NorthSide)) --v.column;
   }
   if (v.row % 2 == 1) {
-    if (v.column == 0 && (coarserSides & kWest)) ++v.row;
-    if (v.column == cells && (coarserSides & kEast)) --v.row;
+    if (v.column == 0 && (coarserSides & WestSide)) ++v.row;
+    if (v.column == cells && (coarserSides & EastSide)) --v.row;
   }
   return v;
 }
@@ -37,13 +37,13 @@ struct PatchBorder {
 
 PatchBorder borderAt(PatchSide side, int cells) {
   switch (side) {
-    case kSouth:
+    case SouthSide:
       return {{0, 0}, {1, 0}, {0, 1}, false};
-    case kNorth:
+    case NorthSide:
       return {{0, cells}, {1, 0}, {0, -1}, true};
-    case kWest:
+    case WestSide:
       return {{0, 0}, {0, 1}, {1, 0}, false};
-    case kEast:
+    case EastSide:
       break;
   }
   return {{cells, 0}, {0, 1}, {-1, 0}, true};
@@ -107,7 +107,8 @@ std::array<float, 4> patchBorderErrors(const PatchGrid& grid, const TerrainPatch
   const int cells = grid.layout().pyramid.cells;
   std::array<float, 4> errors{};
   for (std::size_t side = 0; side < kPatchSides.size(); ++side) {
-    const auto [start, along, inward, isUpper] = borderAt(kPatchSides[side], cells);
+    const PatchBorder border = borderAt(kPatchSides[side], cells);
+    const PatchVertex start = border.start, along = border.along, inward = border.inward;
     const auto heightAt = [&](int n, int depth) {
       const int column = start.column + n * along.column + depth * inward.column,
                 row = start.row + n * along.row + depth * inward.row;
@@ -123,7 +124,7 @@ std::array<float, 4> patchBorderErrors(const PatchGrid& grid, const TerrainPatch
         pair.places[k] = along.column != 0 ? grid.sampleColumn(patch, first + n)
                                            : grid.sampleRow(patch, first + n);
       }
-      error = std::max(error, pairError(pair, isUpper));
+      error = std::max(error, pairError(pair, border.isUpper));
     }
     errors[side] = levelset::heightRoundedUp(error);
   }

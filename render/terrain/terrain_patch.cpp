@@ -47,10 +47,10 @@ std::optional<TerrainPatch> PatchGrid::existing(const TerrainPatch& patch) const
 
 std::optional<TerrainPatch> PatchGrid::neighbour(const TerrainPatch& patch, PatchSide side) const {
   TerrainPatch beside = patch;
-  if (side == kSouth) --beside.row;
-  if (side == kNorth) ++beside.row;
-  if (side == kWest) --beside.column;
-  if (side == kEast) ++beside.column;
+  if (side == SouthSide) --beside.row;
+  if (side == NorthSide) ++beside.row;
+  if (side == WestSide) --beside.column;
+  if (side == EastSide) ++beside.column;
   return existing(beside);
 }
 

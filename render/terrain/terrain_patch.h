@@ -30,8 +30,8 @@ struct PatchHash {
 };
 
 /// Sides of a patch as bits of a set.
-enum PatchSide : unsigned { kSouth = 1, kEast = 2, kNorth = 4, kWest = 8 };
-inline constexpr std::array<PatchSide, 4> kPatchSides = {kSouth, kEast, kNorth, kWest};
+enum PatchSide : unsigned { SouthSide = 1, EastSide = 2, NorthSide = 4, WestSide = 8 };
+inline constexpr std::array<PatchSide, 4> kPatchSides = {SouthSide, EastSide, NorthSide, WestSide};
 
 /// Places of the patches of a terrain, and the boxes of their ground.
 /// @pre the layout outlives the object

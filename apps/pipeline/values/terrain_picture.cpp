@@ -2,9 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <cstddef>
-
 #include "levelset/error.h"
 #include "levelset/terrain/files/height_field_file.h"
 #include "render/images/grey_image.h"
@@ -37,14 +34,6 @@ levelset::HeightField readTerrainPicture(const std::filesystem::path& file, std:
     }
   levelset::requireHeights(terrain);
   return terrain;
-}
-
-void writeTerrainPicture(const std::filesystem::path& file, const levelset::HeightField& terrain,
-                         const std::vector<std::uint8_t>& greys) {
-  const std::ptrdiff_t width = terrain.columns;
-  render::writeGreyPng(file, terrain.columns, terrain.rows,
-                       greys.data() + (terrain.rows - 1) * width, -width,
-                       std::find(greys.begin(), greys.end(), 0) != greys.end());
 }
 
 }  // namespace pipeline

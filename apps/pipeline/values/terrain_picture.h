@@ -20,10 +20,4 @@ namespace pipeline {
 [[nodiscard]] levelset::HeightField readTerrainPicture(const std::filesystem::path& file,
                                                        std::size_t maxMemory);
 
-/// Writes grey values of the samples of a terrain to a PNG, with north at the top. Samples of value
-/// 0 are transparent.
-/// @throws levelset::IoError, levelset::ResourceLimit
-void writeTerrainPicture(const std::filesystem::path& file, const levelset::HeightField& terrain,
-                         const std::vector<std::uint8_t>& greys);
-
 }  // namespace pipeline

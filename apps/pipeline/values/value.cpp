@@ -122,7 +122,8 @@ Value::Value(levelset::SegmentedField field) : data_(std::move(field)) {}
 Value::Value(levelset::Molecule molecule)
     : data_(std::make_shared<const levelset::Molecule>(std::move(molecule))) {}
 Value::Value(levelset::HeightField terrain)
-    : data_(std::make_shared<const levelset::HeightField>(std::move(terrain))) {}
+    : data_(std::shared_ptr<const levelset::HeightField>(
+          std::make_shared<levelset::HeightField>(std::move(terrain)))) {}
 Value::Value(DeformationValue deformation) : data_(std::move(deformation)) {}
 Value::Value(Plan plan) : plan_(plan) {}
 
@@ -205,6 +206,16 @@ const levelset::Molecule& Value::molecule() const {
 
 std::shared_ptr<const levelset::HeightField> Value::sharedTerrain() const {
   return as<std::shared_ptr<const levelset::HeightField>>(Kind::Terrain);
+}
+levelset::HeightField Value::takeTerrain(std::size_t maxMemory) {
+  (void)plan();  // lengths in voxels need it later
+  std::shared_ptr<const levelset::HeightField> shared = sharedTerrain();
+  data_ = std::make_shared<const levelset::HeightField>();
+  // The constructor has made an object that is not const.
+  if (shared.use_count() == 1)
+    return std::move(*std::const_pointer_cast<levelset::HeightField>(shared));
+  levelset::requireMemory(static_cast<double>(shared->memoryUse()), maxMemory);
+  return *shared;
 }
 const levelset::HeightField& Value::terrain() const {
   return *as<std::shared_ptr<const levelset::HeightField>>(Kind::Terrain);

@@ -159,6 +159,9 @@ class Value {
   [[nodiscard]] const levelset::HeightField& terrain() const;
   [[nodiscard]] const DeformationValue& deformation() const;
   [[nodiscard]] std::shared_ptr<const levelset::HeightField> sharedTerrain() const;
+  /// Takes the terrain out of this value. Copies it if other values share it. This value keeps its
+  /// plan and an empty terrain. @throws levelset::ResourceLimit for a copy
+  [[nodiscard]] levelset::HeightField takeTerrain(std::size_t maxMemory);
 
   /// Returns the plan of the value: its kind, bounds, area and grid, which estimates need. Computes
   /// it from the value on the first call.

@@ -81,7 +81,7 @@ Value sculpt(Invocation& in) {
   const bool isSum = dab.effect == BrushEffect::Raise || dab.effect == BrushEffect::Noise;
   if (in.flag("stroke") && isSum) dab.strength /= strokeWeight();
   levelset::requireLengths(in.operands[0].terrain());
-  HeightField terrain = in.operands[0].terrain();
+  HeightField terrain = in.operands[0].takeTerrain(in.maxMemory);
   levelset::GroundChanges changes(terrain);
   std::size_t beside = 0;
   for (std::size_t n = 0; n < places.size(); ++n) {

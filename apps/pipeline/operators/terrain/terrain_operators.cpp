@@ -1,7 +1,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <span>
 #include <string>
+#include <utility>
 
 #include "apps/pipeline/operators/common.h"
 #include "apps/pipeline/operators/declarations.h"
@@ -13,6 +16,7 @@
 #include "levelset/terrain/ground_slope.h"
 #include "levelset/terrain/height_field.h"
 #include "levelset/terrain/sculpt/ground_edits.h"
+#include "render/images/grey_image.h"
 
 namespace pipeline {
 namespace {
@@ -45,7 +49,7 @@ HeightField sourceOf(Invocation& in) {
       in.given("no-data") ? std::optional(in.number("no-data")) : std::nullopt;
   if (in.operands[0].kind() == Kind::Volume)
     return levelset::heightsOf(volumeIn(in), noData, in.maxMemory);
-  HeightField terrain = in.operands[0].terrain();
+  HeightField terrain = in.operands[0].takeTerrain(in.maxMemory);
   if (noData) {
     for (float& height : terrain.heights)
       if (height == static_cast<float>(*noData)) height = levelset::kMissingHeight;
@@ -135,21 +139,24 @@ Param edgesParam() {
 Value makeSlope(Invocation& in) {
   const levelset::SlopeOptions options{
       .edges = in.flag("edges"), .maxMemory = in.maxMemory, .progress = in.progress};
-  const HeightField& terrain = in.operands[0].terrain();
-  return Value(in.flag("aspect") ? levelset::aspectDegrees(terrain, options)
-                                 : levelset::slopeDegrees(terrain, options));
+  HeightField terrain = in.operands[0].takeTerrain(in.maxMemory);
+  return Value(in.flag("aspect") ? levelset::aspectDegrees(std::move(terrain), options)
+                                 : levelset::slopeDegrees(std::move(terrain), options));
 }
 
 Value drawHillshade(Invocation& in) {
   const HeightField& terrain = in.operands[0].terrain();
-  const std::vector<std::uint8_t> shades =
-      levelset::hillshade(terrain, {.azimuthDegrees = in.number("azimuth"),
-                                    .altitudeDegrees = in.number("altitude"),
-                                    .exaggeration = in.number("exaggeration"),
-                                    .edges = in.flag("edges"),
-                                    .maxMemory = in.maxMemory,
-                                    .progress = in.progress});
-  writeTerrainPicture(in.text("file"), terrain, shades);
+  // Samples without a slope are 0.
+  render::GreyPngWriter picture(in.text("file"), terrain.columns, terrain.rows, true);
+  levelset::forEachShadedRow(terrain,
+                             {.azimuthDegrees = in.number("azimuth"),
+                              .altitudeDegrees = in.number("altitude"),
+                              .exaggeration = in.number("exaggeration"),
+                              .edges = in.flag("edges"),
+                              .maxMemory = in.maxMemory,
+                              .progress = in.progress},
+                             [&](std::span<const std::uint8_t> row) { picture.add(row); });
+  picture.commit();
   return in.operands[0];
 }
 

@@ -61,7 +61,7 @@ TEST(GpuTerrains, HaveTheBitsOfTheProcessor) {
   for (const HeightField& field :
        {support::randomTerrain(2, 2, 0, 1), far, terrain_rays::roughGround(200, 150, 0.1)}) {
     const TerrainCaster caster(shared(field));
-    const Imath::Box3d box = caster.bounds();
+    const Imath::Box3d& box = caster.bounds();
     Numbers numbers(4);
     std::vector<Camera::Ray> rays;
     for (int n = 0; n < 4000; ++n) {

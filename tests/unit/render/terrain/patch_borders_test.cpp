@@ -48,10 +48,10 @@ TEST(PatchBorders, CoverThePatchOnce) {
         EXPECT_EQ(count, 1);
         if (edges.count({edge.second, edge.first})) continue;
         const auto [a, b] = edge;
-        const unsigned side = a.second == 0 && b.second == 0           ? kSouth
-                              : a.first == cells && b.first == cells   ? kEast
-                              : a.second == cells && b.second == cells ? kNorth
-                                                                       : kWest;
+        const unsigned side = a.second == 0 && b.second == 0           ? SouthSide
+                              : a.first == cells && b.first == cells   ? EastSide
+                              : a.second == cells && b.second == cells ? NorthSide
+                                                                       : WestSide;
         const int length = std::abs(b.first - a.first) + std::abs(b.second - a.second);
         EXPECT_EQ(length, coarser & side ? 2 : 1);
       }
