@@ -149,10 +149,20 @@ void CoarseCell::compareCrossings(const HeightField& window, int column, int row
     const double coarse = corners_.low + (corners_.high - corners_.low) * share;
     deviation.error = std::max(deviation.error, std::abs(fine - coarse));
   };
-  for (int n = 1; n < width_; ++n) compareAt(n / width);
-  for (int n = 1; n < height_; ++n) compareAt(n / height);
-  for (int n = std::min(0, width_ - height_); n <= std::max(0, width_ - height_); ++n)
-    if (n != 0) compareAt(n / (width - height));
+  // Shares at which the diagonal may be in the window, with a pad of one sample.
+  const double low = std::max({0.0, (-1 - column) / width, (-1 - row) / height}),
+               high =
+                   std::min({1.0, (window.columns - column) / width, (window.rows - row) / height});
+  if (low > high) return;
+  const auto compareLines = [&](int count) {
+    const int a = static_cast<int>(std::floor(low * count)),
+              b = static_cast<int>(std::floor(high * count));
+    for (int n = std::min(a, b); n <= std::max(a, b) + 1; ++n)
+      if (n != 0) compareAt(n / static_cast<double>(count));
+  };
+  compareLines(width_);
+  compareLines(height_);
+  if (width_ != height_) compareLines(width_ - height_);
 }
 
 double CoarseCell::bound(const Deviation& deviation) const {

@@ -13,6 +13,7 @@
 #include "levelset/deform/cage/cage.h"
 #include "levelset/error.h"
 #include "levelset/geometry/vertex_normals.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/segmented/meshing/segmented_to_mesh.h"
 
 namespace pipeline {
@@ -214,7 +215,8 @@ levelset::HeightField Value::takeTerrain(std::size_t maxMemory) {
   // The constructor has made an object that is not const.
   if (shared.use_count() == 1)
     return std::move(*std::const_pointer_cast<levelset::HeightField>(shared));
-  levelset::requireMemory(static_cast<double>(shared->memoryUse()), maxMemory);
+  levelset::requireMemory(static_cast<double>(shared->memoryUse()),
+                          levelset::memoryLeft(levelset::memoryLimit(maxMemory)));
   return *shared;
 }
 const levelset::HeightField& Value::terrain() const {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -101,27 +102,37 @@ class Gdal {
   }
 };
 
-/// Keeps GDAL silent and its cache small for a while. The program may use GDAL, too.
+/// Keeps GDAL silent and its cache small for a while. The program may use GDAL, too. The cache
+/// belongs to the process: the first of several readers sets it, and the last one restores it.
 class GdalSettings {
  public:
-  explicit GdalSettings(GIntBig cache) : cacheBefore_(gdal_.GDALGetCacheMax64()) {
+  explicit GdalSettings(GIntBig cache) {
     gdal_.CPLPushErrorHandler(gdal_.quiet);
+    const std::lock_guard lock(mutex_);
+    if (readers_++ > 0) return;
+    cacheBefore_ = gdal_.GDALGetCacheMax64();
     gdal_.GDALSetCacheMax64(cache);
   }
   ~GdalSettings() {
-    gdal_.GDALSetCacheMax64(cacheBefore_);
+    {
+      const std::lock_guard lock(mutex_);
+      if (--readers_ == 0) gdal_.GDALSetCacheMax64(cacheBefore_);
+    }
     gdal_.CPLPopErrorHandler();
   }
   GdalSettings(const GdalSettings&) = delete;
   GdalSettings& operator=(const GdalSettings&) = delete;
 
   void needCache(GIntBig bytes) const {
+    const std::lock_guard lock(mutex_);
     if (bytes > gdal_.GDALGetCacheMax64()) gdal_.GDALSetCacheMax64(bytes);
   }
 
  private:
+  static inline std::mutex mutex_;
+  static inline int readers_ = 0;
+  static inline GIntBig cacheBefore_ = 0;
   const Gdal& gdal_ = Gdal::instance();
-  GIntBig cacheBefore_;
 };
 
 class GdalGrid {

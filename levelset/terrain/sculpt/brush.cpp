@@ -54,8 +54,9 @@ class BrushedPart {
       }
       case BrushEffect::Noise: {
         const double wavelength = dab_.wavelength > 0 ? dab_.wavelength : dab_.radius / 4;
-        // Points on a plane between those of the lattice, where the noise is 0.
-        const double layer = 0.5 + dab_.seed;
+        // Points on a plane between those of the lattice, where the noise is 0. Two seeds have no
+        // plane of the lattice in common.
+        const double layer = 0.5 + 2.0 * dab_.seed;
         return change([&](int column, int row, std::size_t n) {
           const Imath::V2d p = field_.position(column, row) / wavelength;
           return dab_.strength * weights_[n] * gradientNoise({p.x, p.y, layer});

@@ -90,7 +90,10 @@ void GroundChanges::add(const GroundEdits& edits) {
       hasChanged_[tile.row * tileColumns_ + tile.column] = true;
 }
 
-GroundEdits GroundChanges::edits(const HeightField& field) const {
+GroundEdits GroundChanges::edits(const HeightField& field, std::size_t maxMemory) const {
+  const auto tiles = std::count(hasChanged_.begin(), hasChanged_.end(), true);
+  requireMemory(static_cast<double>(tiles) * kEditTile * kEditTile * sizeof(float),
+                memoryLeft(memoryLimit(maxMemory)));
   GroundEdits edits{
       .baseHash = baseHash_, .columns = field.columns, .rows = field.rows, .tiles = {}};
   for (std::size_t n = 0; n < hasChanged_.size(); ++n) {

@@ -33,7 +33,9 @@ class GroundChanges {
   /// Adds the tiles of earlier edits of the same terrain.
   void add(const GroundEdits& edits);
   /// Heights of all tiles that were added. @param field  the changed terrain
-  [[nodiscard]] GroundEdits edits(const HeightField& field) const;
+  /// @throws ResourceLimit
+  [[nodiscard]] GroundEdits edits(const HeightField& field,
+                                  std::size_t maxMemory = kNoMemoryLimit) const;
 
  private:
   std::uint64_t baseHash_;

@@ -6,12 +6,14 @@
 #include <utility>
 #include <vector>
 
+#include "levelset/error.h"
+#include "levelset/memory/memory_limit.h"
 #include "levelset/terrain/sculpt/followed_pyramid.h"
 
 namespace levelset {
 namespace terrain {
 
-/// Heights of a rectangle: those before a change, or after it was undone those behind it.
+/// Heights of a rectangle: the old ones, or after an undo the new ones.
 struct HeightChange {
   SampleRange range;
   std::vector<float> heights;
@@ -146,6 +148,10 @@ SampleRange SculptedGround::apply(const BrushDab& dab) {
   if (reached.isEmpty()) return reached;
   const terrain::Stroke none;
   terrain::Stroke kept;
+  // Tiles reach beyond the range by less than one tile on each side.
+  requireMemory(
+      (reached.columns() + 2.0 * kEditTile) * (reached.rows() + 2.0 * kEditTile) * sizeof(float),
+      memoryLeft(memoryLimit(state_->maxMemory)));
   state_->keepTiles(reached, kept, state_->startsStroke ? none : state_->done.back());
   const SampleRange range = applyDab(state_->field, dab, state_->maxMemory);
   if (range.isEmpty()) return range;

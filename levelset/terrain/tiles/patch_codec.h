@@ -14,8 +14,8 @@ namespace levelset::terrain {
 /// @return 0 for a tolerance of 0
 [[nodiscard]] double heightStep(double tolerance);
 
-/// Height that is stored in place of a height: the nearest multiple of the step. It is the height
-/// itself where the multiple, as a float, is farther than the tolerance, and without a tolerance.
+/// Height that is stored in place of a height. With a tolerance it is the nearest multiple of the
+/// step, if that multiple as a float is within the tolerance. Otherwise it is the height itself.
 /// Missing heights get the same bits.
 [[nodiscard]] float storedHeight(float height, double step, double tolerance);
 

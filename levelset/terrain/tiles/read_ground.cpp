@@ -13,14 +13,14 @@ namespace levelset {
 namespace {
 
 /// Samples of a level along an axis, from `first` to `last`.
-struct SampleRange {
+struct AxisRange {
   int first = 0, last = 0;
   [[nodiscard]] int count() const { return last - first + 1; }
 };
 
 /// Part of a ground: samples of a level.
 struct GroundPart {
-  SampleRange columns, rows;
+  AxisRange columns, rows;
 };
 
 /// Samples of a level that are a whole number of its spacings from the first one.
@@ -104,13 +104,13 @@ HeightField readGround(const PatchStore& store, const ReadGroundOptions& options
   field.heights.resize(static_cast<std::size_t>(field.columns) *
                        static_cast<std::size_t>(field.rows));
   const int cells = layout.pyramid.cells;
-  const auto patchesOf = [&](const SampleRange& range, int patches) {
-    return SampleRange{std::min(range.first / cells, patches - 1),
-                       std::min(range.last / cells, patches - 1)};
+  const auto patchesOf = [&](const AxisRange& range, int patches) {
+    return AxisRange{std::min(range.first / cells, patches - 1),
+                     std::min(range.last / cells, patches - 1)};
   };
   const PyramidLevel& level = layout.pyramid.levels[static_cast<std::size_t>(options.level)];
-  const SampleRange across = patchesOf(part.columns, level.columns),
-                    along = patchesOf(part.rows, level.rows);
+  const AxisRange across = patchesOf(part.columns, level.columns),
+                  along = patchesOf(part.rows, level.rows);
   const auto side = static_cast<std::size_t>(cells) + 1;
   ProgressGate gate(options.progress, static_cast<std::size_t>(along.count()));
   for (int row = along.first; row <= along.last; ++row) {

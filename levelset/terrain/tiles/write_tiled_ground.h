@@ -16,8 +16,8 @@ struct WriteTilesOptions {
   Progress progress = {};
 };
 
-/// Writes the ground of a source of rows. The memory is that of the pyramid, and of twice the rows
-/// of one row of patches: the ground may be larger than the memory. The ranges, errors and bounds
+/// Writes the ground of a source of rows. The memory is that of about four rows of patches, and 110
+/// bytes for each patch: the ground may be larger than the memory. The ranges, errors and bounds
 /// of all patches have the bits of heightPyramid() of the stored ground; the tolerance is added to
 /// errors and bounds. Equal grounds in the same order of rows give equal files, for any number of
 /// threads. The number that marks missing samples is not stored.

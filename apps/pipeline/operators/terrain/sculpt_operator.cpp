@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,12 @@ double strokeWeight() {
 std::vector<Imath::V3d> dabPlaces(Invocation& in, double radius) {
   const std::vector<Imath::V3d> points = in.points("at");
   if (!in.flag("stroke")) return points;
+  if (std::all_of(points.begin(), points.end(), [&](const Imath::V3d& p) {
+        return p.x == points.front().x && p.y == points.front().y;
+      }))
+    throw UsageError(
+        "sculpt: --stroke needs a line through at least two positions; give another one to --at, "
+        "or leave --stroke out");
   const double distance = kDabDistance * radius;
   std::vector<Imath::V3d> places = {points.front()};
   double toNext = distance;  // along the line, from the begin of the segment
@@ -82,7 +89,8 @@ Value sculpt(Invocation& in) {
   if (in.flag("stroke") && isSum) dab.strength /= strokeWeight();
   levelset::requireLengths(in.operands[0].terrain());
   HeightField terrain = in.operands[0].takeTerrain(in.maxMemory);
-  levelset::GroundChanges changes(terrain);
+  std::optional<levelset::GroundChanges> changes;
+  if (in.given("edits")) changes.emplace(terrain);
   std::size_t beside = 0;
   for (std::size_t n = 0; n < places.size(); ++n) {
     dab.center = {places[n].x, places[n].y};
@@ -92,7 +100,7 @@ Value sculpt(Invocation& in) {
       dab.level = places[n].z;
     const levelset::SampleRange range = levelset::applyDab(terrain, dab, in.maxMemory);
     beside += range.isEmpty();
-    changes.add(range);
+    if (changes) changes->add(range);
     levelset::report(in.progress, static_cast<double>(n + 1) / static_cast<double>(places.size()));
   }
   if (beside == places.size())
@@ -101,7 +109,7 @@ Value sculpt(Invocation& in) {
         "larger "
         "--radius");
   in.notes.detailsJson = Json{{"dabs", places.size()}, {"dabs_beside", beside}}.dump();
-  if (in.given("edits")) levelset::writeGroundEdits(in.text("edits"), changes.edits(terrain));
+  if (changes) levelset::writeGroundEdits(in.text("edits"), changes->edits(terrain, in.maxMemory));
   return Value(std::move(terrain));
 }
 
@@ -165,7 +173,7 @@ Operator sculptOperator() {
                   .type = ParamType::Flag,
                   .doc =
                       "move the brush along the line through the positions; raise and noise change "
-                      "the middle of a straight line by the strength"},
+                      "the middle of a straight line by the strength, and its ends by half of it"},
                  {.name = "radius",
                   .type = ParamType::Length,
                   .doc = "radius R of the brush",
@@ -218,8 +226,8 @@ Operator sculptOperator() {
             };
             if (brush == "raise" || brush == "noise") {
               // Dabs at one position add up.
-              const double most = std::abs(in.number("strength")) *
-                                  (in.flag("stroke") ? 2.0 : static_cast<double>(points.size()));
+              const double most = std::abs(in.number("strength")) * (in.flag("stroke") ? 2 : 1) *
+                                  static_cast<double>(points.size());
               plan.bounds.min.z -= most;
               plan.bounds.max.z += most;
             }

@@ -107,7 +107,7 @@ Operator tileTerrainOperator() {
       .group = "Terrain",
       .summary = "convert a terrain of any size into a tiled file (lst), row by row",
       .details =
-          "The terrain is never in memory as a whole: it takes about four rows of patches, and 100 "
+          "The terrain is never in memory as a whole: it takes about four rows of patches, and 110 "
           "bytes for each patch. The file has the patches of all levels of a pyramid, their ranges "
           "and errors. 'read' reads it, or a part of it with --box and --level. With --tolerance, "
           "each stored height is within the tolerance of the true one, and the tolerance is part "

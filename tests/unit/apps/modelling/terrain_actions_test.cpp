@@ -311,6 +311,8 @@ TEST_F(TerrainActions, SculptChangesHeights) {
       "read plane.asc ! sculpt --brush raise --at '0,0,0 8,0,0' --stroke --radius 1e-9 "
       "--strength 2",
       2, "larger --radius");
+  expectRefusal("read plane.asc ! sculpt --brush raise --at 4,2,0 --stroke --radius 3 --strength 2",
+                2, "at least two positions");
 }
 
 TEST_F(TerrainActions, SculptKeepsItsEditsInAFile) {

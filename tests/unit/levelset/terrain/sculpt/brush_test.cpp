@@ -1,7 +1,6 @@
 #include "levelset/terrain/sculpt/brush.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <cstring>
@@ -10,6 +9,7 @@
 #include "tests/support/files.h"
 #include "tests/support/measured.h"
 #include "tests/support/terrains.h"
+#include "tests/support/threads.h"
 
 namespace brush_test {
 
@@ -143,11 +143,34 @@ TEST(Brush, AddsNoiseOfAWavelength) {
       most = std::max(most, a.at(column, row));
       step = std::max(step, std::abs(a.at(column + 1, row) - a.at(column, row)));
     }
-  EXPECT_GT(most, 2);
-  EXPECT_LT(most, 10);
-  EXPECT_LT(least, -2);
-  EXPECT_GT(least, -10);
-  EXPECT_LT(step, 10 * 4 / 20.0);  // the slope of the noise is at most about 4 a wavelength
+  EXPECT_GT(most, 3);    // 6.5 of the strength of 10
+  EXPECT_LT(least, -2);  // -5.0
+  EXPECT_LT(most - least, 20);
+  EXPECT_LT(step, support::measured(0.96));  // a slope of 1.9 a wavelength
+}
+
+TEST(Brush, NoiseOfSuccessiveSeedsIsUnrelated) {
+  const HeightField flat = terrainOf(201, 201, {1, 1}, [](double, double) { return 0; });
+  const auto noiseOf = [&](std::uint32_t seed) {
+    HeightField field = flat;
+    applyDab(field, {.effect = BrushEffect::Noise,
+                     .radius = 100,
+                     .strength = 1,
+                     .wavelength = 4,
+                     .seed = seed});
+    return field;
+  };
+  const auto product = [](const HeightField& a, const HeightField& b) {
+    double sum = 0;
+    for (std::size_t n = 0; n < a.heights.size(); ++n)
+      sum += static_cast<double>(a.heights[n]) * static_cast<double>(b.heights[n]);
+    return sum;
+  };
+  for (std::uint32_t seed = 0; seed < 8; ++seed) {
+    const HeightField a = noiseOf(seed), b = noiseOf(seed + 1);
+    const double correlation = product(a, b) / std::sqrt(product(a, a) * product(b, b));
+    EXPECT_LT(std::abs(correlation), 0.07);  // at most 0.045
+  }
 }
 
 TEST(Brush, ErosionMovesGroundAndKeepsItsVolume) {
@@ -204,14 +227,12 @@ TEST(Brush, KeepsMissingSamplesAndSamplesBesideIt) {
 
 TEST(Brush, HasTheSameBitsForAnyNumberOfThreads) {
   const HeightField before = randomTerrain(150, 150, 0.05, 9);
-  for (const BrushEffect effect : {BrushEffect::Flatten, BrushEffect::Smooth, BrushEffect::Erode}) {
+  for (const BrushEffect effect : {BrushEffect::Raise, BrushEffect::Flatten, BrushEffect::Smooth,
+                                   BrushEffect::Noise, BrushEffect::Erode}) {
     HeightField a = before, b = before;
     const BrushDab dab{.effect = effect, .radius = 70, .strength = 1, .talusDegrees = 20};
-    applyDab(a, dab);
-    {
-      const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-      applyDab(b, dab);
-    }
+    support::onThreads(1, [&] { applyDab(a, dab); });
+    support::onThreads(4, [&] { applyDab(b, dab); });
     EXPECT_TRUE(haveSameBits(a, b));
   }
 }
