@@ -84,21 +84,6 @@ std::vector<PatchTriangle> patchTriangles(int cells, int level, const FinerNeigh
   return PatchTriangulation(cells, level, finer).made();
 }
 
-PatchIndexCount countPatchIndices(int cells) {
-  const int levels = patchLevelCount(cells);
-  PatchIndexCount count;
-  for (int level = 0; level < levels; ++level)
-    for (int south = 0; south <= level; ++south)
-      for (int east = 0; east <= level; ++east)
-        for (int north = 0; north <= level; ++north)
-          for (int west = 0; west <= level; ++west) {
-            ++count.sets;
-            count.triangles += patchTriangles(cells, level, {south, east, north, west}).size();
-          }
-  count.bytes = count.triangles * sizeof(PatchTriangle);
-  return count;
-}
-
 std::size_t publishedPatchBytes(int cells) {
   constexpr std::size_t kHeader = 20;
   const auto levels = static_cast<std::size_t>(patchLevelCount(cells));

@@ -31,16 +31,6 @@ using PatchTriangle = std::array<std::uint16_t, 3>;
 [[nodiscard]] std::vector<PatchTriangle> patchTriangles(int cells, int level,
                                                         const FinerNeighbours& finer = {});
 
-/// Numbers of the index sets for all levels and neighbours.
-struct PatchIndexCount {
-  std::size_t sets = 0;
-  std::size_t triangles = 0;  ///< sum over the sets
-  std::size_t bytes = 0;      ///< as lists of 16-bit numbers
-};
-/// Counts the sets that patchTriangles() makes: for each level, each side may have a neighbour of
-/// that level or any finer one. @throws as patchLevelCount
-[[nodiscard]] PatchIndexCount countPatchIndices(int cells);
-
 /// Memory of a patch in the layout of the thesis, bytes: 16-bit heights, a 16-bit error for each
 /// level but the finest, and a header of 20 bytes (two 32-bit addresses beside the heights', level,
 /// bounds). @throws as patchLevelCount
