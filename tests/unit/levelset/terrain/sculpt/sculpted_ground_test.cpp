@@ -1,7 +1,11 @@
 #include "levelset/terrain/sculpt/sculpted_ground.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <cstring>
 #include <random>
 
@@ -185,6 +189,75 @@ TEST_F(GroundEditsFile, BringsTheHeightsBack) {
   HeightField again = base_;
   levelset::applyEdits(again, ground.edits());
   EXPECT_TRUE(haveSameBits(again.heights, ground.field().heights));
+}
+
+/// A child process writes edits to a file and is ended by a signal in the middle.
+/// @param mostBytes  bytes of a file after which the system ends the process
+void writeAndDie(const std::filesystem::path& path, const GroundEdits& edits,
+                 std::size_t mostBytes) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const rlimit noCore = {0, 0}, size = {mostBytes, mostBytes};
+    ::setrlimit(RLIMIT_CORE, &noCore);
+    ::signal(SIGXFSZ, SIG_DFL);
+    ::setrlimit(RLIMIT_FSIZE, &size);
+    levelset::writeGroundEdits(path, edits);
+    ::_exit(0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGXFSZ) << mostBytes;
+}
+
+/// A process that is ended while it writes leaves an old file as it was, and no new file.
+TEST_F(GroundEditsFile, KeepsItsContentWhenTheWriterIsKilled) {
+  GroundEdits later;
+  {
+    SculptedGround ground(base_, {.edits = &edits_});
+    ground.apply({.center = base_.position(20, 90), .radius = 30, .strength = 7});
+    later = ground.edits();
+  }
+  levelset::writeGroundEdits(folder_ / "whole.edits", later);
+  const std::size_t bytes = support::readText(folder_ / "whole.edits").size();
+  levelset::writeGroundEdits(folder_ / "old.edits", edits_);
+  const std::string before = support::readText(folder_ / "old.edits");
+  for (const std::size_t most : {std::size_t{0}, std::size_t{1}, bytes / 2, bytes - 1}) {
+    writeAndDie(folder_ / "old.edits", later, most);
+    EXPECT_EQ(support::readText(folder_ / "old.edits"), before) << most;
+    writeAndDie(folder_ / "new.edits", later, most);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "new.edits")) << most;
+  }
+  HeightField field = base_;
+  levelset::applyEdits(field, levelset::readGroundEdits(folder_ / "old.edits"));
+  EXPECT_TRUE(haveSameBits(field.heights, sculpted_.heights));
+  // The next save is not disturbed by what the killed ones have left.
+  levelset::writeGroundEdits(folder_ / "old.edits", later);
+  EXPECT_EQ(support::readText(folder_ / "old.edits"), support::readText(folder_ / "whole.edits"));
+}
+
+/// A process that saves without end is killed at any time: the file has the bytes of one save.
+TEST_F(GroundEditsFile, HasTheBytesOfOneSaveWhenTheWriterIsKilledAtAnyTime) {
+  GroundEdits other = edits_;
+  other.tiles[1].heights[7] += 1;
+  std::string whole[2];
+  for (const int n : {0, 1}) {
+    levelset::writeGroundEdits(folder_ / "a.edits", n == 0 ? edits_ : other);
+    whole[n] = support::readText(folder_ / "a.edits");
+  }
+  std::mt19937 random(5);
+  for (int trial = 0; trial < 40; ++trial) {
+    const pid_t child = ::fork();
+    if (child == 0)
+      for (;;) {
+        levelset::writeGroundEdits(folder_ / "a.edits", edits_);
+        levelset::writeGroundEdits(folder_ / "a.edits", other);
+      }
+    ::usleep(static_cast<useconds_t>(random() % 5000));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    const std::string found = support::readText(folder_ / "a.edits");
+    EXPECT_TRUE(found == whole[0] || found == whole[1]) << trial;
+  }
 }
 
 TEST_F(GroundEditsFile, RefusesAnotherTerrain) {
