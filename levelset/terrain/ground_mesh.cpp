@@ -243,6 +243,22 @@ TriMesh groundSolidMesh(const HeightField& field, double base, const GroundMeshO
   return meshOfGround(field, &base, options);
 }
 
+HeightField loweredEdges(HeightField field, double depth) {
+  if (!(depth >= 0) || !std::isfinite(depth))
+    throw UsageError(
+        fmt::format("the edges cannot be lowered by {}; give a length of 0 or more", depth));
+  const auto lower = [&](int column, int row) {
+    float& height = field.heights[field.index(column, row)];
+    height = static_cast<float>(static_cast<double>(height) - depth);
+  };
+  for (int row = 0; row < field.rows; ++row) {
+    const bool isEnd = row == 0 || row == field.rows - 1;
+    for (int column = 0; column < field.columns; ++column)
+      if (isEnd || column == 0 || column == field.columns - 1) lower(column, row);
+  }
+  return field;
+}
+
 MeshToBandResult solidify(const HeightField& field, double base, double voxelSize,
                           const SolidifyOptions& options) {
   TriMesh mesh = groundSolidMesh(

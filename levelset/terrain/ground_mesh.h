@@ -31,6 +31,12 @@ struct GroundMeshOptions {
 [[nodiscard]] TriMesh groundSolidMesh(const HeightField& field, double base,
                                       const GroundMeshOptions& options = {});
 
+/// Lowers the samples at the border of the grid. A solid of such a ground lies below the ground
+/// itself in the outermost cells, so the ground hides the edges of the solid's walls there.
+/// @param depth  >= 0, world units
+/// @throws UsageError for a negative depth or one that is not finite
+[[nodiscard]] HeightField loweredEdges(HeightField field, double depth);
+
 struct SolidifyOptions {
   double halfWidth = 3;  ///< half width of the band, voxels
   bool allowMissing = false;

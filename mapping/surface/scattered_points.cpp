@@ -98,6 +98,20 @@ double scaleAt(const ScatterDensity& density, const V3d& place) {
   return scale;
 }
 
+/// Probability of accepting a point.
+double acceptance(const ScatterDensity& density, const SurfacePoint& point) {
+  const double weight = density.weight ? density.weight(point.position) : 1;
+  if (!density.share) return weight;
+  const double share = density.share(point.position, point.normal);
+  if (std::isnan(share)) {
+    const V3d& p = point.position;
+    throw UsageError(fmt::format(
+        "the density at ({:.6g}, {:.6g}, {:.6g}) is not a number; it must be one on the surface",
+        p.x, p.y, p.z));
+  }
+  return weight * std::clamp(share, 0.0, 1.0);
+}
+
 /// The zero set as triangles, sampled by area in units of the local scale. So regions with a small
 /// scale get as many points per scaled area as others.
 class AreaSampler {
@@ -158,10 +172,10 @@ class AreaSampler {
 
 struct Candidates {
   std::vector<SurfacePoint> points;
-  double area = 0;  ///< part of AreaSampler::area() that the weight accepts
+  double area = 0;  ///< part of AreaSampler::area() that weight and share accept
 };
 
-/// Samples candidates by area and accepts each with the probability that `density.weight` gives.
+/// Samples candidates by area and accepts each with its probability.
 Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& density,
                           std::size_t count, Random& random) {
   // Sampling ends after this many rejections in a row.
@@ -173,13 +187,15 @@ Candidates makeCandidates(const AreaSampler& sampler, const ScatterDensity& dens
     SurfacePoint point = sampler(random);
     const double luck = random();
     ++misses;
-    if (density.weight && !(luck < density.weight(point.position))) continue;
+    if (!(luck < acceptance(density, point))) continue;
     misses = 0;
     point.scale = scaleAt(density, point.position);
     result.points.push_back(point);
   }
   if (result.points.empty()) {
-    throw InvalidInput("the mask leaves no position on the surface; enlarge it");
+    throw InvalidInput(density.share
+                           ? "mask and density leave no position on the surface; enlarge them"
+                           : "the mask leaves no position on the surface; enlarge it");
   }
   result.area =
       sampler.area() * static_cast<double>(result.points.size()) / static_cast<double>(tried);

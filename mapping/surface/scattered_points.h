@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -14,11 +15,17 @@
 /// Points distributed evenly over a surface.
 namespace mapping {
 
+/// A number at each point of a surface with its outward unit normal. Several threads may call it at
+/// once.
+using SurfaceShare =
+    std::function<double(const Imath::V3d& position, const Imath::V3d& outwardNormal)>;
+
 struct ScatterDensity {
   std::size_t count = 0;  ///< number of points; 0: as many as `distance` allows
   double distance = 0;    ///< least distance of two points, world units; 0: chosen for `count`
   levelset::ScalarField scale = {};  ///< position-dependent factor of distances, positive; empty: 1
   levelset::ScalarField weight = {};  ///< probability of accepting a point, 0 to 1; empty: 1
+  SurfaceShare share = {};            ///< factor of weight that may depend on the normal; empty: 1
   std::uint64_t seed = 1;
   std::size_t maxMemory = levelset::kNoMemoryLimit;
   levelset::Progress progress = {};
@@ -47,8 +54,8 @@ struct ScatteredPoints {
 /// on opposite sides of a part thinner than a quarter of the least distance ignore each other. The
 /// same seed gives the same points.
 /// @throws UsageError unless exactly one of count and distance is positive, or for a scale that is
-///         not positive and finite, with its position
-/// @throws InvalidInput for a base without a surface, or a weight that leaves no position
+///         not positive and finite, or a share that is not a number, with its position
+/// @throws InvalidInput for a base without a surface, or a weight or share that leaves no position
 /// @throws ResourceLimit for more than a million points
 [[nodiscard]] ScatteredPoints scatterPoints(const levelset::NarrowBand& base,
                                             const ScatterDensity& density);

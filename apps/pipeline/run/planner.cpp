@@ -55,6 +55,21 @@ std::string roiText(const RegionOfInterest& roi, const Plan& plan) {
   return text;
 }
 
+/// Size of a terrain, or the box of one that becomes a volume.
+std::string groundText(const Node& node, const Plan& plan,
+                       const std::vector<std::optional<Plan>>& plans) {
+  if (plan.kind == Kind::Terrain && plan.samples.x > 0)
+    return fmt::format("; {}x{} samples", plan.samples.x, plan.samples.y);
+  const bool isVolume = plan.kind == Kind::Band || plan.kind == Kind::Surface;
+  const bool isOfGround = std::any_of(node.inputs.begin(), node.inputs.end(), [&](std::size_t i) {
+    return plans[i] && plans[i]->kind == Kind::Terrain;
+  });
+  const Imath::Box3d& box = plan.bounds;
+  if (!isVolume || !isOfGround || box.isEmpty()) return "";
+  return fmt::format("; a volume from {:.4g},{:.4g},{:.4g} to {:.4g},{:.4g},{:.4g}", box.min.x,
+                     box.min.y, box.min.z, box.max.x, box.max.y, box.max.z);
+}
+
 /// Estimated bytes of a value within its region of interest; 0 if unknown.
 double bytesOf(const std::optional<Plan>& plan, const RegionOfInterest& roi) {
   if (!plan) return 0;
@@ -303,7 +318,7 @@ void explain(const Graph& graph, std::size_t maxMemory, bool fullValues,
     text += fmt::format("{:<20} {}", labelOf(node), reasonFor(graph, i, runs));
     if (plans[i]) {
       const Plan plan = restricted(*plans[i], regions[i]);
-      text += roiText(regions[i], *plans[i]);
+      text += roiText(regions[i], *plans[i]) + groundText(node, plan, plans);
       if (plan.kind == Kind::Band && plan.voxelSize > 0)
         text += fmt::format("; about {:.3g} voxels of {:.4g}, {:.3g} MB", plan.activeVoxels(),
                             plan.voxelSize, plan.bytes() * 1e-6);

@@ -13,6 +13,7 @@
 #include "apps/pipeline/operators/mapping/patch_options.h"
 #include "apps/pipeline/registry/invocation.h"
 #include "levelset/error.h"
+#include "levelset/fields/expression.h"
 #include "mapping/placement/make_patch.h"
 
 namespace pipeline {
@@ -26,7 +27,23 @@ void validateScatter(const Invocation& in) {
   if (in.integer("seed") < 0)
     throw UsageError(
         fmt::format("scatter: --seed {} is negative; give 0 or more", in.integer("seed")));
+  if (in.given("density") && !in.text("density").starts_with('@')) {
+    const levelset::NormalSpeed density = levelset::speedExpression(in.text("density"));
+    if (density.usesTime || density.usesCurvature)
+      throw UsageError(
+          fmt::format("scatter: --density '{}' depends on {}; use x, y, z, r and the normal nx, "
+                      "ny, nz",
+                      in.text("density"), density.usesTime ? "the time t" : "the curvature k"));
+  }
   validateLayers(in);
+}
+
+/// Returns the density of positions as a function of place and normal.
+mapping::SurfaceShare densityOf(const Invocation& in) {
+  const levelset::NormalSpeed density = normalSpeed(in, "density");
+  return [value = density.value](const Imath::V3d& position, const Imath::V3d& normal) {
+    return value({.position = position, .normal = normal});
+  };
 }
 
 mapping::ScatterOptions scatterOptions(Invocation& in) {
@@ -39,6 +56,7 @@ mapping::ScatterOptions scatterOptions(Invocation& in) {
   if (in.given("scale")) options.density.scale = scalarField(in, "scale");
   if (const std::optional<levelset::Mask> mask = maskOf(in))
     options.density.weight = [mask = *mask](const Imath::V3d& p) { return mask.weight(p); };
+  if (in.given("density")) options.density.share = densityOf(in);
   options.density.seed = static_cast<std::uint64_t>(in.integer("seed"));
   options.density.progress = in.progress;
   options.density.maxMemory = in.maxMemory;
@@ -95,10 +113,12 @@ Value scatter(Invocation& in) {
                                                    in.given("scale") ? " at scale 1" : "")
                                      : ""));
   if (options.density.count > result.patches.size()) {
-    in.notes.warnings.push_back(fmt::format(
-        "scatter: {} of {} patches could not be placed; the first reason: {}",
-        options.density.count - result.patches.size(), options.density.count,
-        result.leftOut > 0 ? result.cause : "the mask leaves too small a part of the surface"));
+    in.notes.warnings.push_back(
+        fmt::format("scatter: {} of {} patches could not be placed; the first reason: {}",
+                    options.density.count - result.patches.size(), options.density.count,
+                    result.leftOut > 0 ? result.cause
+                                       : "mask and density leave too small a part of "
+                                         "the surface"));
   } else if (result.leftOut > 0) {
     in.notes.notes.push_back(
         fmt::format("no patch could be built at {} positions; the first reason: {}", result.leftOut,
@@ -146,7 +166,8 @@ Operator scatterOperator() {
       .summary = "scatter patches over a surface, evenly and at random",
       .details =
           "The centres are Poisson-disc samples of the surface. --scale varies the size of patches "
-          "and their distances over the surface, --along turns u, a mask thins the patches out. "
+          "and their distances over the surface, --along turns u, a mask or --density thins the "
+          "patches out. "
           "There is no patch where the surface is too curved for one, or where the patch would "
           "fold.",
       .example =
@@ -173,6 +194,11 @@ Operator scatterOperator() {
                        .type = ParamType::Scalar,
                        .doc = "field that scales the size, height and distance of the patches at "
                               "each point; default: 1"},
+                      {.name = "density",
+                       .type = ParamType::Speed,
+                       .doc = "share of the positions, from 0 to 1, that is kept at each point: a "
+                              "formula in x, y, z, r and the outward normal nx, ny, nz, or a "
+                              "field; acos(nz) is the slope of a terrain, in radians"},
                       {.name = "along",
                        .type = ParamType::Velocity,
                        .doc = "vector field for the direction of u of each patch; only its "

@@ -102,10 +102,17 @@ Plan planTerrain(Invocation& in) {
   plan.bounds.extendBy(Imath::V3d(end.x, end.y, scale * source.bounds.max.z));
   if (in.given("crop")) {
     const Imath::Box3d box = in.box("crop");
+    const Imath::V2i samples(place.columns, place.rows);
     for (int axis = 0; axis < 2; ++axis) {
-      plan.bounds.min[axis] = std::max(plan.bounds.min[axis], box.min[axis]);
-      plan.bounds.max[axis] = std::min(plan.bounds.max[axis], box.max[axis]);
+      const auto [first, last] = levelset::samplesBetween(
+          place.origin[axis], place.spacing[axis], samples[axis], box.min[axis], box.max[axis]);
+      if (first > last) return plan;  // the run refuses it
+      plan.samples[axis] = last - first + 1;
+      plan.bounds.min[axis] = place.origin[axis] + first * place.spacing[axis];
+      plan.bounds.max[axis] = place.origin[axis] + last * place.spacing[axis];
     }
+    plan.fieldBytes =
+        static_cast<double>(plan.samples.x) * static_cast<double>(plan.samples.y) * sizeof(float);
   }
   return plan;
 }

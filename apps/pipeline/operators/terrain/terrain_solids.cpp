@@ -43,7 +43,9 @@ double longestSideOf(const Imath::Box3d& box) {
 
 /// Options of the conversion of the mesh, as of 'level-set'.
 levelset::LevelSetOperator::Options conversionOf(Invocation& in) {
-  return {.voxel = {.edge = in.voxelSize(longestSideOf(solidBounds(in)))},
+  const double voxel = in.voxelSize(longestSideOf(solidBounds(in)));
+  in.setReference(voxel, in.operands[0].diagonal());  // of --lower-edges
+  return {.voxel = {.edge = voxel},
           .halfWidth = in.number("half-width"),
           .sign = levelset::SignMode::Closed};
 }
@@ -58,13 +60,21 @@ levelset::ValuePlan meshEstimate(Invocation& in) {
   return mesh;
 }
 
+levelset::TriMesh groundSolidOf(Invocation& in, const levelset::HeightField& terrain) {
+  const double base = baseOf(in, in.operands[0].plan().bounds);
+  const levelset::GroundMeshOptions options{.allowMissing = in.flag("allow-missing"),
+                                            .maxMemory = in.maxMemory};
+  if (!in.given("lower-edges")) return levelset::groundSolidMesh(terrain, base, options);
+  levelset::requireMemory(static_cast<double>(terrain.memoryUse()), in.maxMemory);
+  return levelset::groundSolidMesh(levelset::loweredEdges(terrain, in.length("lower-edges")), base,
+                                   options);
+}
+
 Value makeTerrainSolid(Invocation& in) {
   const levelset::HeightField& terrain = in.operands[0].terrain();
   levelset::requireLengths(terrain);
   const levelset::LevelSetOperator::Options options = conversionOf(in);
-  levelset::TriMesh mesh = levelset::groundSolidMesh(
-      terrain, baseOf(in, in.operands[0].plan().bounds),
-      {.allowMissing = in.flag("allow-missing"), .maxMemory = in.maxMemory});
+  levelset::TriMesh mesh = groundSolidOf(in, terrain);
   levelset::OperatorRun run = detail::runOf(in);
   run.releaseOperands = [&] {
     mesh = {};
@@ -157,6 +167,12 @@ Operator solidifyOperator() {
                   .doc = "height of the base, below the ground; default: a twentieth of the longer "
                          "side below the lowest sample",
                   .allowsVoxels = false},
+                 {.name = "lower-edges",
+                  .type = ParamType::Length,
+                  .doc = "lower the samples at the border of the terrain by this length, so that "
+                         "the terrain around the solid covers its edges in pictures, see 'scene "
+                         "--outside'; half a voxel suffices",
+                  .range = Range::NonNegative},
                  allowMissingParam("make vertical walls around samples without data"),
                  voxelParam(),
                  resolutionParam(),

@@ -214,6 +214,21 @@ TEST_F(TerrainActions, SolidifyMakesASolid) {
   EXPECT_EQ(report["steps"][1]["certificate"]["closed"], true);
 }
 
+TEST_F(TerrainActions, SolidifyLowersTheEdges) {
+  const auto volume = [&](const std::string& options) {
+    return json("read plane.asc ! solidify --base -1 --voxel 0.1 " + options +
+                " ! measure --json")["volume"]
+        .get<double>();
+  };
+  // A prism below a triangle has the mean height of its corners. The three inner samples have 18 of
+  // the 48 corners, and the border has 30.
+  EXPECT_NEAR(volume("") - volume("--lower-edges 0.4"), 0.4 * 32 * 30 / 48, 0.1);
+  EXPECT_NEAR(volume("--lower-edges 4vx"), volume("--lower-edges 0.4"), 1e-9);
+  expectRefusal("read plane.asc ! solidify --base -1 --voxel 0.1 --lower-edges=-1", 2,
+                "lower-edges");
+  expectRefusal("read plane.asc ! solidify --base -1 --voxel 0.1 --lower-edges 2", 3, "base");
+}
+
 TEST_F(TerrainActions, SurfaceBandTakesABox) {
   const std::string band = "read plane.asc ! surface-band --voxel 0.1 --half-width 5";
   const Json whole = json(band + " ! info --json"),
@@ -233,6 +248,37 @@ TEST_F(TerrainActions, SurfaceBandTakesABox) {
   expectRefusal(
       "sphere --radius 1 --voxel 0.2 ! mesh ! surface-band --voxel 0.1 --box '0,0,0 1,1,1'", 2,
       "--box is for terrains");
+}
+
+TEST_F(TerrainActions, ScatterFollowsSlopeAndHeight) {
+  // Level ground at x < 20 and x > 40, with a slope of 45 degrees between them.
+  std::string rows;
+  for (int j = 0; j < 31; ++j) {
+    for (int i = 0; i < 31; ++i)
+      rows += std::to_string(i < 10 ? 0 : i > 20 ? 20 : 2 * (i - 10)) + " ";
+    rows += "\n";
+  }
+  writeFile("step.asc", "ncols 31\nnrows 31\nxllcenter 0\nyllcenter 0\ncellsize 2\n" + rows);
+  const auto placed = [&](const std::string& density) {
+    return json(
+        "read step.asc ! surface-band --voxel 1 --half-width 5 --as ground ! scatter @ground "
+        "--count 20 --size 2,2 --particles spline --height 2 --layers 2 --density \"" +
+        density +
+        "\" --as places ! box --size 1,1,1 --voxel 0.25 ! mesh --as stone "
+        "! texture @ground @stone @places --map mesh ! measure --json")["bounds"];
+  };
+  const Json steep = placed("acos(nz)*180/pi > 30");
+  EXPECT_GT(steep["min"][0], 16);
+  EXPECT_LT(steep["max"][0], 44);
+  const Json high = placed("nz > 0.95 && z > 10");
+  EXPECT_GT(high["min"][0], 36);
+  const Json low = placed("(nz > 0.95) * (z < 10)");
+  EXPECT_LT(low["max"][0], 24);
+  const std::string scatter =
+      "sphere --radius 4 --voxel 0.5 ! scatter --count 3 --size 1,1 --height 1 --density ";
+  expectRefusal(scatter + "k", 2, "the curvature k");
+  expectRefusal(scatter + "t", 2, "the time t");
+  expectRefusal(scatter + "\"sqrt(nz - 2)\"", 2, "not a number");
 }
 
 TEST_F(TerrainActions, MeshAndRenderShowTheGround) {
@@ -364,6 +410,20 @@ TEST_F(TerrainActions, PlansWithoutRunning) {
         "read plane.asc ! terrain --crop '0,0,0 5,5,5' ! surface-band --resolution 50",
         "read plane.asc ! slope ! terrain --scale 2 ! info"})
     EXPECT_EQ(levelsmith(std::string("--dry-run ") + chain).code, 0) << chain;
+}
+
+TEST_F(TerrainActions, ExplainShowsTheBoxesThatBecomeVolumes) {
+  const auto plan = levelsmith(
+      "--explain read plane.asc --as land ! terrain --crop \"2,0,0 6,4,9\" ! solidify --base -9 "
+      "--voxel 0.5 --lower-edges 0.5vx --as cut ! surface-band @land --box \"0,0,0 4,3,9\" --voxel "
+      "0.5 "
+      "! info ! scene @land @cut --outside \"2,0,-9 6,4,9\" ! render a.png");
+  ASSERT_EQ(plan.code, 0) << plan.err;
+  const std::string text = plan.out + plan.err;
+  EXPECT_NE(text.find("; 5x3 samples"), std::string::npos) << text;
+  EXPECT_NE(text.find("; 3x3 samples"), std::string::npos) << text;
+  EXPECT_NE(text.find("; a volume from 2,0,-9 to 6,4,4"), std::string::npos) << text;
+  EXPECT_NE(text.find("; a volume from 0,0,0 to 4,3,4"), std::string::npos) << text;
 }
 
 }  // namespace terrain_actions_test

@@ -97,6 +97,25 @@ TEST(Solidify, MakesABoxOfLevelGround) {
   EXPECT_LT(most, support::rounding(1));
 }
 
+TEST(LoweredEdges, ChangesTheBorderOnly) {
+  const HeightField field = support::randomTerrain(9, 7, 0.1, 4);
+  const HeightField lowered = levelset::loweredEdges(field, 0.5);
+  for (int row = 0; row < 7; ++row)
+    for (int column = 0; column < 9; ++column) {
+      const bool isBorder = column == 0 || column == 8 || row == 0 || row == 6;
+      ASSERT_EQ(lowered.isMissing(column, row), field.isMissing(column, row));
+      if (field.isMissing(column, row)) continue;
+      EXPECT_EQ(
+          lowered.at(column, row),
+          static_cast<float>(static_cast<double>(field.at(column, row)) - (isBorder ? 0.5 : 0)));
+    }
+  EXPECT_EQ(levelset::loweredEdges(field, 0).missingCount(), field.missingCount());
+  const HeightField one = terrainOf(1, 1, {1, 1}, [](double, double) { return 3; });
+  EXPECT_EQ(levelset::loweredEdges(one, 1).at(0, 0), 2);
+  EXPECT_THROW((void)levelset::loweredEdges(field, -1), levelset::UsageError);
+  EXPECT_THROW((void)levelset::loweredEdges(field, HUGE_VAL), levelset::UsageError);
+}
+
 /// The volume of the solid converges to that of the prisms below its triangles. A level set rounds
 /// each edge by about half a voxel².
 TEST(Solidify, HasTheVolumeOfThePrisms) {

@@ -116,6 +116,31 @@ TEST(ScatteredPoints, FollowScaleAndWeight) {
   for (const SurfacePoint& p : weighted.points) EXPECT_GT(p.position.x, 1.49);
 }
 
+TEST(ScatteredPoints, FollowAShareThatDependsOnTheNormal) {
+  const auto flat = [](const V3d&, const V3d& normal) { return normal.z > 0.8 ? 1.0 : 0.0; };
+  const auto level = scatterPoints(ball(), {.count = 60, .share = flat});
+  ASSERT_EQ(level.wanted, 60u);
+  for (const SurfacePoint& p : level.points) EXPECT_GT(p.normal.z, 0.8);
+  // The cap is as dense as one that a weight of the position leaves, and both multiply.
+  const auto high = [](const V3d& p) { return p.z > 0.8 * kRadius ? 1.0 : 0.0; };
+  const auto same = scatterPoints(ball(), {.count = 60, .weight = high});
+  EXPECT_NEAR(level.distance, same.distance, support::measured(1e-3) * same.distance);
+  const auto east = [](const V3d& p) { return p.x > 0 ? 1.0 : 0.0; };
+  for (const SurfacePoint& p :
+       scatterPoints(ball(), {.count = 30, .weight = east, .share = flat}).points) {
+    EXPECT_GT(p.position.x, -0.01);
+    EXPECT_GT(p.normal.z, 0.8);
+  }
+  // Beyond 1 it is 1.
+  const auto twice = [](const V3d&, const V3d&) { return 2.0; };
+  EXPECT_EQ(scatterPoints(ball(), {.count = 40, .share = twice}).points.size(),
+            scatterPoints(ball(), {.count = 40}).points.size());
+  const auto none = [](const V3d&, const V3d&) { return 0.0; };
+  EXPECT_THROW((void)scatterPoints(ball(), {.count = 3, .share = none}), InvalidInput);
+  const auto bad = [](const V3d&, const V3d& n) { return std::sqrt(n.z - 2); };
+  EXPECT_THROW((void)scatterPoints(ball(), {.count = 3, .share = bad}), UsageError);
+}
+
 TEST(ScatteredPoints, DependOnTheSeedOnly) {
   const auto places = [](std::uint64_t seed) {
     std::vector<double> result;

@@ -276,6 +276,46 @@ TEST(TerrainScene, HasNoSeamAroundASolid) {
   }
 }
 
+/// Pixels of a lit picture whose colours differ from those of the ground alone by more than a
+/// tenth, beside the walls of a solid that replaces the ground in a box.
+std::size_t rimOf(const HeightField& field, const Imath::Box3d& box, double lowered,
+                  const V3d& away) {
+  constexpr double kVoxel = 0.25;
+  Scene alone = sceneOf(field, {.isSmooth = false});
+  Scene both = sceneOf(field, {.isSmooth = false, .outside = box});
+  const HeightField part = levelset::loweredEdges(levelset::croppedHeights(field, box), lowered);
+  both.solids.push_back({.band = levelset::solidify(part, box.min.z, kVoxel).band, .id = 8});
+  alone.terrains[0].colour = both.terrains[0].colour = both.solids[0].colour = {0.8f, 0.8f, 0.8f};
+  alone.camera = cameraAt(field.bounds(), away, 0.9, 128);
+  alone.camera.to = box.center();
+  both.camera = alone.camera;
+  const RenderOptions options{.samples = 1, .ambientSamples = 0, .shadowSamples = 4};
+  const Image expected = renderCpu(alone, options), found = renderCpu(both, options);
+  std::size_t rim = 0;
+  for (std::size_t n = 0; n < expected.ids.at("id").size(); ++n) {
+    const double x = static_cast<double>(expected.channels.at("P.X")[n]),
+                 y = static_cast<double>(expected.channels.at("P.Y")[n]);
+    const double inside =
+        std::min(std::min(x - box.min.x, box.max.x - x), std::min(y - box.min.y, box.max.y - y));
+    if (expected.ids.at("id")[n] == 0 || std::abs(inside) > 0.5) continue;
+    if (std::abs(found.channels.at("G")[n] - expected.channels.at("G")[n]) > 0.08f) ++rim;
+  }
+  return rim;
+}
+
+/// The edges of a solid show through the ground at the walls of its box, unless they are lowered.
+TEST(TerrainScene, HasNoRimAroundASolidWithLoweredEdges) {
+  const HeightField field = terrain_rays::hills(65, 65, 1);
+  const Imath::Box3d box(V3d(-10, -8, -12), V3d(9, 11, 12));
+  std::size_t level = 0, lowered = 0;
+  for (const V3d& away : {V3d(1, 0.2, 0.9), V3d(-0.3, -1, 0.6), V3d(-1, 0.3, 0.7)}) {
+    level += rimOf(field, box, 0, away);
+    lowered += rimOf(field, box, 0.125, away);
+  }
+  EXPECT_GT(level, 30U);
+  EXPECT_LE(lowered, 6U);
+}
+
 TEST(TerrainScene, ShowsACaveInTheGround) {
   const HeightField field =
       support::terrainOf(41, 41, {0.5, 0.5}, [](double, double) { return 0; });
