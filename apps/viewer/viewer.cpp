@@ -256,6 +256,9 @@ void Viewer::press(unsigned character) {
     case 'd':
       toggleDeformEditor();
       break;
+    case 's':
+      toggleSculptEditor();
+      break;
     case 'p':
       asksScreenshot_ = true;
       break;
@@ -321,7 +324,11 @@ void Viewer::useMouse(int width, int height) {
       hasDragged_ = false;
     }
   }
-  if (drag_ == Drag::None) return;
+  if (drag_ == Drag::None) {
+    // The circle of the brush follows the pointer.
+    if (sculptEditor_ && !io.WantCaptureMouse) moveEditor(place, camera_.camera(width, height));
+    return;
+  }
   if (drag_ == Drag::Points)
     moveEditor(place, camera_.camera(width, height));
   else

@@ -13,6 +13,7 @@
 #include "apps/viewer/editing/deform_preview.h"
 #include "apps/viewer/editing/patch_editor.h"
 #include "apps/viewer/editing/patch_preview.h"
+#include "apps/viewer/editing/sculpt_editor.h"
 #include "apps/viewer/interaction/orbit_camera.h"
 #include "apps/viewer/interaction/pick.h"
 #include "apps/viewer/interaction/progressive_picture.h"
@@ -72,7 +73,7 @@ class Viewer {
   void useMouse(int width, int height);
   void dragTo(const Imath::V2d& place, int width, int height);
   // === What the patch and the deformation share, viewer_editing.cpp
-  [[nodiscard]] bool isEditing() const { return patchEditor_ || deformEditor_; }
+  [[nodiscard]] bool isEditing() const { return patchEditor_ || deformEditor_ || sculptEditor_; }
   /// Adapts the editors to a new model. @param keepsDesign  false: they are put away
   void restartEditors(bool keepsDesign);
   [[nodiscard]] bool pressEditor(const Imath::V2d& place, const render::Camera& camera,
@@ -107,6 +108,19 @@ class Viewer {
   void saveDeformation(const std::filesystem::path& name);
   void drawDeformPart();
   void drawDeformControls();
+
+  // === Sculpting a terrain, viewer_sculpt.cpp
+  void toggleSculptEditor();
+  void startSculpting();
+  /// Shows the ground as it is now.
+  void takeSculpted();
+  [[nodiscard]] bool pressSculpting(const Imath::V2d& place, const render::Camera& camera);
+  void moveSculpting(const Imath::V2d& place, const render::Camera& camera);
+  [[nodiscard]] bool pressForSculpting(unsigned character);
+  void stepSculpting(bool isUndo);
+  void copySculpting(bool isChain);
+  void saveSculpting(const std::filesystem::path& name);
+  void drawSculptPart();
 
   void pickAt(const Imath::V2d& place, bool isForTarget);
   void finishPick();
@@ -178,6 +192,12 @@ class Viewer {
   std::filesystem::path deformFile_ = "lattice.json";
   std::vector<Imath::V3d> savedPoints_;
   bool isGivenDeformation_ = false;  // the deformation of the arguments was started
+  // The ground that the user sculpts; null outside that mode.
+  std::unique_ptr<SculptEditor> sculptEditor_;
+  std::shared_ptr<const Model> sculptModel_;
+  std::filesystem::path editsFile_;  // file of the edits; it exists if hasEditsFile_
+  bool hasEditsFile_ = false;
+  bool hadEdits_ = false;  // edits of a file were applied before the first stroke
   bool asksResult_ = false;
   std::array<char, 512> resultName_{};
 

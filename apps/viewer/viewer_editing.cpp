@@ -12,6 +12,7 @@ namespace viewer {
 std::shared_ptr<const Model> Viewer::shownModel() const {
   if (patchEditor_ && patchPreview_ && patchPreview_->model) return patchPreview_->model;
   if (deformEditor_ && deformPreview_ && deformPreview_->model) return deformPreview_->model;
+  if (sculptModel_) return sculptModel_;
   return model_;
 }
 
@@ -37,6 +38,12 @@ void Viewer::restartEditors(bool keepsDesign) {
       deformEditor_ = nullptr;
     }
   }
+  if (sculptEditor_) {
+    // Strokes belong to the heights before them, which may have changed.
+    sculptEditor_ = nullptr;
+    sculptModel_ = nullptr;
+    if (keepsDesign && whyNoSculpting(*model_).empty()) startSculpting();
+  }
   startGivenDeformation();
 }
 
@@ -45,15 +52,18 @@ bool Viewer::pressEditor(const Imath::V2d& place, const render::Camera& camera, 
     requestPatchPreview();
     return true;
   }
+  if (sculptEditor_ && !isAdding) return pressSculpting(place, camera);
   return deformEditor_ && deformEditor_->press(place, camera, isAdding);
 }
 
 void Viewer::moveEditor(const Imath::V2d& place, const render::Camera& camera) {
   if (patchEditor_ && patchEditor_->moveTo(place, camera)) requestPatchPreview();
   if (deformEditor_ && deformEditor_->moveTo(place, camera)) requestDeformPreview();
+  if (sculptEditor_) moveSculpting(place, camera);
 }
 
 void Viewer::releaseEditor() {
+  if (sculptEditor_) sculptEditor_->release();
   if (patchEditor_) {
     patchEditor_->release();
     requestPatchPreview();
@@ -68,6 +78,7 @@ void Viewer::releaseEditor() {
 }
 
 bool Viewer::pressForEditor(unsigned character) {
+  if (sculptEditor_) return pressForSculpting(character);
   if (!deformEditor_) return false;
   if (deformEditor_->isDragging() && character >= 'x' && character <= 'z') {
     const int axis = static_cast<int>(character - 'x');
@@ -82,6 +93,10 @@ bool Viewer::pressForEditor(unsigned character) {
 bool Viewer::pressForEditor(const KeyPress& key) {
   if (patchEditor_ && key.key == GLFW_KEY_BACKSPACE) {
     if (patchEditor_->removeSelected()) requestPatchPreview();
+    return true;
+  }
+  if (sculptEditor_ && key.withControl && (key.key == GLFW_KEY_Z || key.key == GLFW_KEY_Y)) {
+    stepSculpting(key.key == GLFW_KEY_Z);
     return true;
   }
   if (!deformEditor_) return false;
@@ -104,13 +119,16 @@ void Viewer::takePreviews() {
 void Viewer::copyCommand(bool isChain) {
   if (patchEditor_) copyPatch(isChain);
   if (deformEditor_) copyDeformation(isChain);
+  if (sculptEditor_) copySculpting(isChain);
 }
 
 void Viewer::saveResult() {
   if (!isEditing()) return;
   const std::filesystem::path name(resultName_.data());
   try {
-    patchEditor_ ? savePatch(name) : saveDeformation(name);
+    if (patchEditor_) savePatch(name);
+    if (deformEditor_) saveDeformation(name);
+    if (sculptEditor_) saveSculpting(name);
     showMessage(fmt::format("{} was written.", name.string()));
   } catch (const std::exception& error) {
     showMessage(error.what());
@@ -123,6 +141,7 @@ void Viewer::drawControls(int width, int height) {
   if (patchEditor_)
     drawMarksOf(patchEditor_->strokes(camera), patchEditor_->marks(camera),
                 patchPreview_ && !patchPreview_->failure.empty(), width, height);
+  if (sculptEditor_) drawMarksOf(sculptEditor_->strokes(camera), {}, false, width, height);
   if (!deformEditor_) return;
   const bool isRefused = deformPreview_ && deformPreview_->isRefused();
   drawMarksOf(deformEditor_->strokes(camera), deformEditor_->marks(camera), isRefused, width,
@@ -178,8 +197,10 @@ void Viewer::drawResultDialog() {
     return ImGui::EndPopup();
   }
   if (ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
-  ImGui::InputText(patchEditor_ ? "name (.vdb, .patch)" : "name (.json, .ply, .vdb)",
-                   resultName_.data(), resultName_.size());
+  const char* label = patchEditor_    ? "name (.vdb, .patch)"
+                      : deformEditor_ ? "name (.json, .ply, .vdb)"
+                                      : "name (.edits)";
+  ImGui::InputText(label, resultName_.data(), resultName_.size());
   if (ImGui::Button("Write") || isEntered_) {
     saveResult();
     ImGui::CloseCurrentPopup();

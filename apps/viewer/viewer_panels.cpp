@@ -37,6 +37,7 @@ void Viewer::drawPanel() {
     drawClipPart();
     if (!deformEditor_) drawPatchEditorPart();
     drawDeformPart();
+    drawSculptPart();
   }
   drawEffectPart();
   drawPatchPart();
@@ -220,7 +221,7 @@ void Viewer::drawKeysDialog() {
   if (asksKeys_) ImGui::OpenPopup(kTitle);
   asksKeys_ = false;
   if (!ImGui::BeginPopupModal(kTitle, nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
-  constexpr std::array<std::array<const char*, 2>, 20> kKeys = {{
+  constexpr std::array<std::array<const char*, 2>, 21> kKeys = {{
       {"left button", "turn; with shift: move"},
       {"middle, right", "move"},
       {"wheel", "zoom in and out at the pointer"},
@@ -236,11 +237,12 @@ void Viewer::drawKeysDialog() {
       {"backspace", "remove the point of the patch that was moved last"},
       {"d", "deform: drag control points, with shift several; x, y or z while dragging: axis"},
       {"a", "select all control points, or none"},
-      {"Ctrl+Z, Y", "of a deformation: undo, redo"},
+      {"s", "sculpt a terrain; 1 to 6: brush, [ and ]: radius"},
+      {"Ctrl+Z, Y", "of a deformation or sculpting: undo, redo"},
       {"p", "write a picture"},
       {"r", "read the files again"},
       {"Ctrl+O, C, Q", "open a file, copy all points, quit"},
-      {"Ctrl+C, K, S", "of a patch or deformation: copy the action, copy the chain, write it"},
+      {"Ctrl+C, K, S", "of what you edit: copy the action, copy the chain, write it"},
   }};
   for (const auto& [key, what] : kKeys) {
     textOf(key);

@@ -15,7 +15,6 @@
 namespace viewer {
 namespace {
 
-constexpr int kTerrainCells = 32;        // cells along a side of a patch
 constexpr double kTerrainPixels = 1;     // pixel error of the pictures
 constexpr std::uint32_t kTerrainId = 1;  // id of the ground in pictures
 
@@ -43,9 +42,10 @@ ShownTerrain readShownTerrain(const std::filesystem::path& file,
       fmt::format("terrain of {} x {} samples, {:.6g} x {:.6g} apart{}", field.columns, field.rows,
                   field.spacing.x, field.spacing.y, isGeographic ? " (degrees became metres)" : "");
   levelset::HeightPyramid pyramid = levelset::heightPyramid(
-      field, {.cells = kTerrainCells, .progress = levelset::subProgress(progress, 0.6, 1)});
-  shown.store = levelset::patchStoreOf(
-      std::make_shared<const levelset::HeightField>(std::move(field)), std::move(pyramid));
+      field, {.cells = kShownCells, .progress = levelset::subProgress(progress, 0.6, 1)});
+  shown.field = std::make_shared<const levelset::HeightField>(std::move(field));
+  shown.wasGeographic = isGeographic;
+  shown.store = levelset::patchStoreOf(shown.field, std::move(pyramid));
   return shown;
 }
 
@@ -55,7 +55,9 @@ Imath::Box3d boundsOf(const ShownTerrain& terrain) {
 }
 
 TerrainFrames::TerrainFrames(const ShownTerrain& terrain)
-    : detail_(terrain.store, {.onArrival = [this] { noteArrival(); }}),
+    : reading_(terrain.isReadAtOnce ? render::TerrainDetail::Reading::Now
+                                    : render::TerrainDetail::Reading::Background),
+      detail_(terrain.store, {.onArrival = [this] { noteArrival(); }}),
       painter_(render::makeTerrainPainter(detail_.layout())) {}
 
 void TerrainFrames::noteArrival() {
@@ -68,8 +70,7 @@ void TerrainFrames::noteArrival() {
 
 TerrainFrames::Drawn TerrainFrames::draw(const render::Camera& camera) {
   const int arrivals = arrivals_;
-  const render::TerrainSelection selection =
-      detail_.select(camera, kTerrainPixels, render::TerrainDetail::Reading::Background);
+  const render::TerrainSelection selection = detail_.select(camera, kTerrainPixels, reading_);
   Drawn drawn;
   drawn.image = std::make_shared<render::Image>(imageOf(painter_->draw(selection, camera), camera));
   // Patches that arrived after they were looked up are drawn by the next picture.

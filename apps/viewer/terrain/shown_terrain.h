@@ -19,13 +19,20 @@ namespace viewer {
 /// A terrain that the viewer shows.
 struct ShownTerrain {
   std::shared_ptr<const levelset::PatchStore> store;
-  std::string description;  ///< size and spacing, as a line for the user
+  std::shared_ptr<const levelset::HeightField> field;  ///< heights of the store
+  std::string description;                             ///< size and spacing, as a line for the user
+  bool wasGeographic = false;                          ///< the file has degrees
+  /// Patches are read before they are drawn, so that no coarser ones are seen.
+  bool isReadAtOnce = false;
 };
 
 /// Reads a terrain for the viewer. Degrees become metres.
 /// @throws as readHeightField(), metricHeights() and heightPyramid()
 [[nodiscard]] ShownTerrain readShownTerrain(const std::filesystem::path& file,
                                             const levelset::Progress& progress = {});
+
+/// Cells along a side of a patch of the viewer's pyramids.
+inline constexpr int kShownCells = 32;
 
 /// Box of the ground. @pre the terrain has a known sample
 [[nodiscard]] Imath::Box3d boundsOf(const ShownTerrain& terrain);
@@ -54,6 +61,7 @@ class TerrainFrames {
   std::atomic<int> arrivals_ = 0;
   int drawnArrivals_ = 0;  // arrivals before the last picture
   std::string note_;
+  render::TerrainDetail::Reading reading_;
   render::TerrainDetail detail_;
   std::unique_ptr<render::TerrainPainter> painter_;
 };

@@ -360,6 +360,53 @@ TEST_F(ViewerCommand, DeformsByALatticeWithTheMouse) {
   EXPECT_EQ(again.out, "3\n2\n") << again.err;
 }
 
+TEST_F(ViewerCommand, SculptsATerrainWithTheMouse) {
+  std::string rows;
+  for (int j = 0; j < 65; ++j) {
+    for (int i = 0; i < 65; ++i)
+      rows += fmt::format("{:.2f} ", 6 * std::sin(0.11 * i) * std::cos(0.13 * j));
+    rows += "\n";
+  }
+  writeFile("hills.asc", "ncols 65\nnrows 65\nxllcenter 0\nyllcenter 0\ncellsize 1\n" + rows);
+  // Strokes with all brushes, from the second half of the window: the panel is at the left. The
+  // last stroke is undone, done again and undone.
+  writeFile("sculpt.play",
+            "wait\nkey s\nwait\npicture before.png\n"
+            "drag 330,170 420,190\nkey 2\nclick 380,230\nkey 3\nclick 350,190\nkey 4\nkey ]\n"
+            "click 420,160\nkey 5\ndrag 440,200 400,240\nkey 6\nclick 330,170\nwait\n"
+            "picture six.png\nkey 1\nclick 400,200\nkey ctrl+z\nkey ctrl+y\nkey ctrl+z\nwait\n"
+            "picture undone.png\nkey ctrl+c\ncopied\nkey ctrl+s\nkey enter\nwait\n"
+            "key ctrl+k\ncopied\n");
+  const std::string view = " --from 32,-50,60 --to 20,30,0 --up 0,0,1 --size 560x350 ";
+  const Outcome seen = onDisplay("view hills.asc" + view + "--play sculpt.play");
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  const std::vector<std::string> lines = linesOf(seen.out);
+  ASSERT_EQ(lines.size(), 2u) << seen.out;
+  for (const char* brush : {"raise", "smooth", "flatten", "noise", "erode"})
+    EXPECT_NE(lines[0].find(std::string("sculpt --brush ") + brush), std::string::npos) << brush;
+  EXPECT_EQ(lines[1],
+            "levelsmith read 'hills.asc' ! terrain --edits 'hills.edits' ! write sculpted.asc");
+  EXPECT_NE(png("before.png").bytes, png("six.png").bytes);
+
+  // The actions and the file make the same bits as the viewer.
+  const Outcome made = levelsmith("read hills.asc ! " + lines[0] + " ! write actions.asc");
+  ASSERT_EQ(made.code, 0) << made.err;
+  const Outcome file = levelsmith(lines[1].substr(std::string("levelsmith ").size()));
+  ASSERT_EQ(file.code, 0) << file.err;
+  EXPECT_EQ(shell("cmp actions.asc sculpted.asc").code, 0);
+  EXPECT_NE(shell("cmp hills.asc sculpted.asc").code, 0);
+
+  // Sculpting goes on from the file, and refuses one of another terrain.
+  writeFile("again.play",
+            "wait\nkey s\nwait\nclick 380,200\nkey ctrl+s\nkey enter\nwait\nkey ctrl+c\ncopied\n");
+  const Outcome again =
+      onDisplay("cp hills.edits first.edits; view hills.asc" + view + "--play again.play");
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_EQ(again.out, "terrain --edits 'hills.edits'\n");
+  EXPECT_NE(shell("cmp hills.edits first.edits").code, 0);
+  EXPECT_EQ(levelsmith("read hills.asc ! terrain --edits hills.edits ! info").code, 0);
+}
+
 TEST_F(ViewerCommand, RefusesInputScriptsThatItDoesNotKnow) {
   makeBall();
   writeFile("bad.play", "wait\njump 1,2\n");
