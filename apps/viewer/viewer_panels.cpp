@@ -33,11 +33,12 @@ void Viewer::drawPanel() {
   drawViewPart();
   drawLayerPart();
   drawVolumePart();
-  if (!model_ || !model_->volume) {
+  if (model_ && model_->terrain) {
+    drawSculptPart();
+  } else if (!model_ || !model_->volume) {
     drawClipPart();
     if (!deformEditor_) drawPatchEditorPart();
     drawDeformPart();
-    drawSculptPart();
   }
   drawEffectPart();
   drawPatchPart();

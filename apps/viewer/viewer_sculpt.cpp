@@ -126,7 +126,7 @@ void Viewer::saveSculpting(const std::filesystem::path& name) {
 }
 
 void Viewer::drawSculptPart() {
-  if (!model_ || !model_->terrain || !beginPart("Sculpt")) return;
+  if (!beginPart("Sculpt")) return;
   if (!sculptEditor_) {
     if (ImGui::Button("Sculpt the ground")) toggleSculptEditor();
     return;
