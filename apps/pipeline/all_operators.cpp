@@ -63,6 +63,7 @@ std::vector<Operator> allOperators() {
       contoursOperator(),
       tileTerrainOperator(),
       terrainMeshOperator(),
+      tiledTerrainMeshOperator(),
       solidifyOperator(),
       unionWithSegmentations(unionOperator()),
       intersectionOperator(),

@@ -56,6 +56,7 @@ namespace pipeline {
 [[nodiscard]] Operator contoursOperator();
 [[nodiscard]] Operator tileTerrainOperator();
 [[nodiscard]] Operator terrainMeshOperator();
+[[nodiscard]] Operator tiledTerrainMeshOperator();
 [[nodiscard]] Operator solidifyOperator();
 /// The action `surface-band`, for open meshes and terrains.
 [[nodiscard]] Operator surfaceBandOperator();

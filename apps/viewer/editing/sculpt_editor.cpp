@@ -122,6 +122,8 @@ std::string whyNoSculpting(const Model& model) {
   if (!model.terrain) return "The ground of a terrain can be sculpted; open one.";
   if (model.terrain->wasGeographic)
     return "The terrain is in degrees; make one in metres with 'terrain --metric' first.";
+  if (!model.terrain->field)
+    return "A tiled terrain is not in memory; make a file of a part of it with 'read --box'.";
   return "";
 }
 

@@ -13,6 +13,7 @@
 #include "levelset/mesh.h"
 #include "levelset/mesh_files/mesh_file.h"
 #include "levelset/terrain/files/height_field_file.h"
+#include "levelset/terrain/tiles/tiled_ground.h"
 #include "levelset/volume_files/volume_file.h"
 #include "mapping/patches/patch_file.h"
 #include "render/views/scene_file.h"
@@ -25,7 +26,7 @@ using levelset::UsageError;
 
 constexpr const char* kFormats =
     "vdb, nii, mha, mhd, nrrd, nhdr, mrc or map, ply, obj, stl or off (also .gz), asc, hgt, flt, "
-    "bil, tif, dem or dt0 to dt2, json or patch";
+    "bil, tif, dem, dt0 to dt2 or lst, json or patch";
 
 enum class FileKind { Band, Volume, Mesh, Terrain, Scene, Patch, Unknown };
 
@@ -36,7 +37,8 @@ FileKind kindOf(const fs::path& file) {
   if (levelset::isBandFormat(file)) return FileKind::Band;
   // A raw file has no header, and the viewer has no options for its layout.
   if (levelset::isVolumeFormat(file) && !levelset::isRawFormat(file)) return FileKind::Volume;
-  if (levelset::isHeightFormat(file)) return FileKind::Terrain;
+  if (levelset::isHeightFormat(file) || levelset::isTiledGroundFormat(file))
+    return FileKind::Terrain;
   return FileKind::Unknown;
 }
 

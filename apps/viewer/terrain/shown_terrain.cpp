@@ -10,6 +10,7 @@
 #include "levelset/error.h"
 #include "levelset/terrain/files/height_field_file.h"
 #include "levelset/terrain/height_pyramid.h"
+#include "levelset/terrain/tiles/tiled_ground.h"
 #include "render/terrain/terrain_patch.h"
 
 namespace viewer {
@@ -26,26 +27,49 @@ std::array<float, 256> linearOfBytes() {
   return linear;
 }
 
+std::string descriptionOf(const levelset::GroundLayout& layout) {
+  return fmt::format("terrain of {} x {} samples, {:.6g} x {:.6g} apart", layout.columns,
+                     layout.rows, layout.spacing.x, layout.spacing.y);
+}
+
+void requireKnown(bool isAnyKnown, const std::filesystem::path& file) {
+  if (!isAnyKnown)
+    throw levelset::InvalidInput(
+        fmt::format("'{}' has no known height; choose another file", file.string()));
+}
+
+ShownTerrain openShownTiles(const std::filesystem::path& file) {
+  ShownTerrain shown;
+  shown.store = levelset::openTiledGround(file);
+  const levelset::GroundLayout& layout = shown.store->layout();
+  if (layout.isGeographic)
+    throw levelset::InvalidInput(
+        fmt::format("'{}' is in degrees; make a terrain in metres with 'read {} ! terrain "
+                    "--metric'",
+                    file.string(), file.string()));
+  const render::PatchGrid grid(layout);
+  requireKnown(!grid.box(grid.root()).isEmpty(), file);
+  shown.description = descriptionOf(layout) + ", tiled";
+  return shown;
+}
+
 }  // namespace
 
 ShownTerrain readShownTerrain(const std::filesystem::path& file,
                               const levelset::Progress& progress) {
+  if (levelset::isTiledGroundFormat(file)) return openShownTiles(file);
   levelset::HeightField field =
       levelset::readHeightField(file, {.progress = levelset::subProgress(progress, 0, 0.6)});
-  const bool isGeographic = field.isGeographic;
-  if (isGeographic) field = levelset::metricHeights(std::move(field));
-  if (field.missingCount() == field.heights.size())
-    throw levelset::InvalidInput(
-        fmt::format("'{}' has no known height; choose another file", file.string()));
   ShownTerrain shown;
-  shown.description =
-      fmt::format("terrain of {} x {} samples, {:.6g} x {:.6g} apart{}", field.columns, field.rows,
-                  field.spacing.x, field.spacing.y, isGeographic ? " (degrees became metres)" : "");
+  shown.wasGeographic = field.isGeographic;
+  if (shown.wasGeographic) field = levelset::metricHeights(std::move(field));
+  requireKnown(field.missingCount() < field.heights.size(), file);
   levelset::HeightPyramid pyramid = levelset::heightPyramid(
       field, {.cells = kShownCells, .progress = levelset::subProgress(progress, 0.6, 1)});
   shown.field = std::make_shared<const levelset::HeightField>(std::move(field));
-  shown.wasGeographic = isGeographic;
   shown.store = levelset::patchStoreOf(shown.field, std::move(pyramid));
+  shown.description = descriptionOf(shown.store->layout()) +
+                      (shown.wasGeographic ? " (degrees became metres)" : "");
   return shown;
 }
 

@@ -19,15 +19,17 @@ namespace viewer {
 /// A terrain that the viewer shows.
 struct ShownTerrain {
   std::shared_ptr<const levelset::PatchStore> store;
-  std::shared_ptr<const levelset::HeightField> field;  ///< heights of the store
+  std::shared_ptr<const levelset::HeightField> field;  ///< heights; null for a tiled file
   std::string description;                             ///< size and spacing, as a line for the user
   bool wasGeographic = false;                          ///< the file has degrees
   /// Patches are read before they are drawn, so that no coarser ones are seen.
   bool isReadAtOnce = false;
 };
 
-/// Reads a terrain for the viewer. Degrees become metres.
-/// @throws as readHeightField(), metricHeights() and heightPyramid()
+/// Reads a terrain for the viewer. Degrees become metres. Patches of a tiled file are read when
+/// pictures need them, so it may be larger than the memory.
+/// @throws InvalidInput for a terrain without a known height, and a tiled file in degrees
+/// @throws as readHeightField(), metricHeights(), heightPyramid() and openTiledGround()
 [[nodiscard]] ShownTerrain readShownTerrain(const std::filesystem::path& file,
                                             const levelset::Progress& progress = {});
 

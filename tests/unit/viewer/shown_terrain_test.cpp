@@ -4,14 +4,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <fstream>
 #include <thread>
 
+#include "apps/viewer/editing/sculpt_editor.h"
 #include "apps/viewer/interaction/pick.h"
 #include "apps/viewer/interaction/progressive_picture.h"
 #include "levelset/error.h"
+#include "levelset/terrain/tiles/write_tiled_ground.h"
 #include "tests/support/files.h"
 #include "tests/support/measured.h"
 
@@ -86,6 +89,31 @@ TEST(ShownTerrain, LeavesHolesOpen) {
   const auto frame = drawn(view, {});
   EXPECT_FALSE(pick(*frame, 60, 45));
   EXPECT_TRUE(pick(*frame, 60, 65));
+}
+
+/// A tiled file has the picture of the same terrain in memory.
+TEST(ShownTerrain, DrawsFromATiledFile) {
+  const support::TemporaryFolder folder;
+  const auto model = std::make_shared<const Model>(openModel({planeIn(folder)}));
+  levelset::writeTiledGround(folder / "plane.lst", *model->terrain->field, {.cells = kShownCells});
+  const auto tiled = std::make_shared<const Model>(openModel({folder / "plane.lst"}));
+  EXPECT_EQ(tiled->description, "terrain of 61 x 41 samples, 2 x 2 apart, tiled");
+  EXPECT_FALSE(tiled->terrain->field);
+  EXPECT_EQ(tiled->bounds.min, model->bounds.min);
+  EXPECT_EQ(tiled->bounds.max, model->bounds.max);
+  EXPECT_EQ(drawn(viewOf(tiled), {})->canvas.colours, drawn(viewOf(model), {})->canvas.colours);
+  EXPECT_NE(whyNoSculpting(*tiled).find("tiled"), std::string::npos);
+
+  levelset::HeightField field = *model->terrain->field;
+  field.isGeographic = true;
+  levelset::writeTiledGround(folder / "degrees.lst", field);
+  EXPECT_THROW((void)openModel({folder / "degrees.lst"}), levelset::InvalidInput);
+  field.isGeographic = false;
+  std::fill(field.heights.begin(), field.heights.end(), levelset::kMissingHeight);
+  levelset::writeTiledGround(folder / "none.lst", field);
+  EXPECT_THROW((void)openModel({folder / "none.lst"}), levelset::InvalidInput);
+  std::ofstream(folder / "bad.lst") << "not tiled";
+  EXPECT_THROW((void)openModel({folder / "bad.lst"}), levelset::InvalidInput);
 }
 
 TEST(ShownTerrain, RefusesWhatATerrainHasNot) {

@@ -43,6 +43,25 @@ TEST_F(TiledTerrain, WriteAndReadKeepTheTerrain) {
             json("read ground.asc ! measure --above 3 --json"));
 }
 
+TEST_F(TiledTerrain, MeshOfAPictureReadsOnlyItsPatches) {
+  // The file and the terrain in memory have patches of the same size, so they have the same mesh.
+  ASSERT_EQ(levelsmith("read ground.asc ! write a.lst --cells 32").code, 0);
+  const std::string camera = " --from 200,-90,160 --to 200,120,20 --pixel-error 3";
+  ASSERT_EQ(levelsmith("tiled-terrain-mesh a.lst" + camera + " ! write tiled.ply").code, 0);
+  ASSERT_EQ(levelsmith("read ground.asc ! terrain-mesh" + camera + " ! write whole.ply").code, 0);
+  EXPECT_EQ(support::readText(folder_ / "tiled.ply"), support::readText(folder_ / "whole.ply"));
+  // A complete mesh without a camera of its own, and plans.
+  EXPECT_GT(json("tiled-terrain-mesh a.lst ! info --json")["triangles"], 100);
+  EXPECT_EQ(levelsmith("--dry-run tiled-terrain-mesh a.lst ! info").code, 0);
+  EXPECT_EQ(levelsmith("--explain tiled-terrain-mesh a.lst ! info").code, 0);
+  expectRefusal("tiled-terrain-mesh ground.asc", 2, "ends in .lst");
+  expectRefusal("tiled-terrain-mesh none.lst", 6, "none.lst");
+  expectRefusal("tiled-terrain-mesh a.lst --from 4,-9,9 --to 4,-20,9", 3, "shows no ground");
+  expectRefusal("tiled-terrain-mesh a.lst --to 1,2,3", 2, "--from");
+  writeFile("bad.lst", "no tiles");
+  expectRefusal("tiled-terrain-mesh bad.lst", 3, "bad.lst");
+}
+
 TEST_F(TiledTerrain, ReadTakesAPartAndALevel) {
   ASSERT_EQ(levelsmith("read ground.asc ! write a.lst --cells 4").code, 0);
   EXPECT_EQ(json("read a.lst --box '100,50,0 305,120,1' ! info --json")["hash"],

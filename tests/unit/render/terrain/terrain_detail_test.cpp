@@ -12,8 +12,11 @@
 
 #include "levelset/error.h"
 #include "levelset/terrain/ground_mesh.h"
+#include "levelset/terrain/tiles/tiled_ground.h"
+#include "levelset/terrain/tiles/write_tiled_ground.h"
 #include "render/terrain/resident_patches.h"
 #include "tests/support/drawn_terrain.h"
+#include "tests/support/files.h"
 #include "tests/support/measured.h"
 #include "tests/support/terrain_stores.h"
 #include "tests/support/threads.h"
@@ -204,6 +207,48 @@ TEST(TerrainDetail, StaysWithinItsMemory) {
   EXPECT_FALSE(fine.isComplete);
   EXPECT_EQ(CrackCount(field, detail.layout(), fine)(terrainTriangles(detail.layout(), fine)), 0u);
   EXPECT_LE(detail.mostMemoryUse(), limit);
+}
+
+/// A flight over a tiled file whose heights take ten times the memory. Patches are read by a thread
+/// while coarser ones are drawn. There is no crack and no hole, and at the end of each stage the
+/// triangles are those of a ground in memory.
+TEST(TerrainDetail, FliesOverATiledFileTenTimesAsLargeAsItsMemory) {
+  HeightField field = support::fractalTerrain(9, 0.5, 11);
+  field.origin = {-256, -256};
+  const int cells = 8;
+  const support::TemporaryFolder folder;
+  levelset::writeTiledGround(folder / "land.lst", field, {.cells = cells});
+  const std::size_t limit = 500 * ResidentPatches::patchBytes(cells);
+  TerrainDetail detail(levelset::openTiledGround(folder / "land.lst"), {.maxBytes = limit});
+  TerrainDetail whole(storeOf(field, cells), {.maxBytes = kMuch});
+  std::size_t patches = 0;
+  for (const levelset::PyramidLevel& level : detail.layout().pyramid.levels)
+    patches += static_cast<std::size_t>(level.columns) * static_cast<std::size_t>(level.rows);
+  ASSERT_GT(patches * ResidentPatches::patchBytes(cells), 10 * limit);
+  Camera camera;
+  camera.up = {0, 0, 1};
+  camera.width = camera.height = 256;
+  std::size_t late = 0;
+  for (int n = 0; n < 80; ++n) {
+    camera.from = {-220.0 + 5 * n, -150 + 3.5 * n, 50};
+    camera.to = camera.from + Imath::V3d(20, 12, -12);
+    TerrainSelection flown = detail.select(camera, 6, Reading::Background);
+    late += !flown.isComplete;
+    EXPECT_EQ(CrackCount(field, detail.layout(), flown)(terrainTriangles(detail.layout(), flown)),
+              0u);
+    EXPECT_LE(detail.memoryUse(), limit);
+    if (n % 10 != 9) continue;
+    flown = detail.select(camera, 6);
+    EXPECT_TRUE(flown.isComplete);
+    const TriMesh seen = terrainTriangles(detail.layout(), flown),
+                  same = terrainTriangles(whole.layout(), whole.select(camera, 6));
+    EXPECT_EQ(seen.triangles, same.triangles);
+    EXPECT_EQ(seen.positions, same.positions);
+    EXPECT_TRUE(std::isfinite(support::largestPixelError(field, seen, camera)));
+  }
+  EXPECT_GT(late, 0u);
+  EXPECT_LE(detail.mostMemoryUse(), limit);
+  EXPECT_GT(whole.mostMemoryUse(), limit);
 }
 
 /// Patches that cannot be read are drawn by coarser ones, without holes or cracks, and are
