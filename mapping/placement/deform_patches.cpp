@@ -107,6 +107,7 @@ DeformPatchesResult deformPatches(std::span<const Patch> patches,
                      0.7 + 0.3 * static_cast<double>(p) / static_cast<double>(patches.size()));
     Patch& moved = result.patches[p];
     deformation.requireDefined(particlesOf(patches.subspan(p, 1)), "particle");
+    deformation.requireDefined({moved.corners.begin(), moved.corners.end()}, "corner");
     if (!isIdentity) {
       for (V3d& corner : moved.corners) corner = deformation.at(corner);
       for (ParticleLayer& layer : moved.layers) {

@@ -168,8 +168,7 @@ const std::string& BezierCaster::refusalAsSolid() const {
     const std::size_t count = data.volume.patches.size();
     if (const std::size_t open = findOpenPatch(data.volume); open < count)
       data.refusal = fmt::format(
-          "its surface is open at patch {}; give a volume whose inside keeps away from its outer "
-          "faces",
+          "its surface is open at patch {}; give a volume that is closed, or leave it out of --csg",
           open + 1);
     else if (const std::size_t folded = findFoldedPatch(data.volume); folded < count)
       data.refusal = fmt::format(

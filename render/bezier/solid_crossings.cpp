@@ -3,6 +3,7 @@
 #include <Imath/ImathBox.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -248,14 +249,17 @@ std::size_t findFoldedPatch(const BezierVolume& volume) {
   const auto patches = static_cast<double>(volume.patches.size());
   const int samples = static_cast<int>(
       std::clamp(std::cbrt(kMostSamples / patches), kFewestPatchSamples, kMostPatchSamples));
-  return tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, volume.patches.size()), volume.patches.size(),
-      [&](const tbb::blocked_range<std::size_t>& range, std::size_t least) {
-        for (std::size_t p = range.begin(); p < std::min(range.end(), least); ++p)
-          if (foldsInObject(volume, volume.patches[p], samples)) return p;
-        return least;
-      },
-      [](std::size_t a, std::size_t b) { return std::min(a, b); });
+  // Callers hold a lock. A thread that waits here must not take a task that needs the same lock.
+  return tbb::this_task_arena::isolate([&] {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, volume.patches.size()), volume.patches.size(),
+        [&](const tbb::blocked_range<std::size_t>& range, std::size_t least) {
+          for (std::size_t p = range.begin(); p < std::min(range.end(), least); ++p)
+            if (foldsInObject(volume, volume.patches[p], samples)) return p;
+          return least;
+        },
+        [](std::size_t a, std::size_t b) { return std::min(a, b); });
+  });
 }
 
 }  // namespace render

@@ -95,9 +95,10 @@ void PictureLayers::addWarnings(Image& image, const Scene& scene) const {
   if (const std::size_t count = open; count > 0) {
     image.attributes["ls:bezierOpen"] = fmt::format("{}", count);
     warn(fmt::format(
-        "{} ray{} enter{} a Bézier volume of the expression and do{} not leave it, or the reverse; "
-        "their crossings there are left out, so the expression may be wrong at their pixels",
-        count, count == 1 ? "" : "s", count == 1 ? "s" : "", count == 1 ? "es" : ""));
+        "camera rays entered a Bézier volume of the expression without leaving it, or left it "
+        "without entering, {} time{}; these crossings are left out, so pixels may be wrong; close "
+        "the gaps of the volume, or leave it out of --csg",
+        count, count == 1 ? "" : "s"));
   }
   const std::size_t count = beyondBand;
   if (count == 0) return;

@@ -127,7 +127,8 @@ Plan planScene(Invocation& in) {
 render::BezierPart bezierPart(const Value& operand, const std::string& name) {
   const render::Scene& scene = operand.scene().scene;
   const std::size_t others = scene.solids.size() + scene.meshes.size() + scene.quadrics.size() +
-                             (scene.volumePart ? 1 : 0);
+                             scene.terrains.size() + scene.mapped.size() +
+                             (scene.volumePart ? 1 : 0) + (scene.segmented ? 1 : 0);
   if (scene.beziers.size() != 1 || others > 0)
     throw UsageError(
         fmt::format("scene: '{}' is a scene with other parts than one Bézier volume; list its "
@@ -177,8 +178,13 @@ Value makeScene(Invocation& in) {
       continue;
     }
     if (in.operands[i].kind() == Kind::Scene) {
-      scene.beziers.push_back(
-          {bezierPart(in.operands[i], names[i]).caster, colour, id, names[i], opacities[i]});
+      render::BezierPart part = bezierPart(in.operands[i], names[i]);
+      // The file may have a colour, other than the default of all parts, and an opacity.
+      if (in.given("colours") || part.colour == render::MeshPart().colour) part.colour = colour;
+      if (in.given("opacities")) part.opacity = opacities[i];
+      part.id = id;
+      part.name = names[i];
+      scene.beziers.push_back(std::move(part));
       beziers.push_back(names[i]);
       continue;
     }

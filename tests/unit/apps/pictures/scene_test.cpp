@@ -221,4 +221,60 @@ TEST_F(Scenes, FromBrokenFilesAreRefused) {
   EXPECT_EQ(readChanged("{", "[").code, 3);
 }
 
+/// A Bézier volume of two boxes that share the face x = 0. Solid is where the attribute is
+/// negative.
+/// @param atFace  attribute of the left box at the middle control point of that face; 1 elsewhere
+std::string twoBoxes(double atFace) {
+  Json patches = Json::array();
+  for (const double left : {-1.0, 0.0}) {
+    Json points = Json::array();
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 3; ++j)
+        for (int k = 0; k < 3; ++k) {
+          const bool isMiddle = left < 0 && i == 1 && j == 1 && k == 1;
+          points.push_back({left + i, j - 1, k - 1, isMiddle ? atFace : 1.0});
+        }
+    patches.push_back({{"degree", {1, 2, 2}}, {"points", points}});
+  }
+  return Json({{"format", "levelsmith bezier volume"},
+               {"version", 1},
+               {"isovalue", 0},
+               {"patches", patches}})
+      .dump();
+}
+
+TEST_F(Scenes, KeepTheLooksOfABezierVolume) {
+  writeFile("rest.json", twoBoxes(-9));
+  writeFile("ground.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n0 0\n0 1\n");
+  const std::string ball = " ! sphere --radius 0.5 --voxel 0.1 --as b ! scene @v @b ";
+  ASSERT_EQ(levelsmith("read rest.json --as v ! scene @v --colours 1,0,0 --opacities 0.5 "
+                       "! write red.json")
+                .code,
+            0);
+  ASSERT_EQ(levelsmith("read red.json --as v" + ball + "! write both.json").code, 0);
+  const Json part = Json::parse(shell("cat both.json").out)["beziers"][0];
+  EXPECT_EQ(part["colour"], Json({1.0, 0.0, 0.0}));
+  EXPECT_EQ(part["opacity"], 0.5);
+  // Other parts of the file would be lost.
+  ASSERT_EQ(levelsmith("read rest.json --as v ! read ground.asc --as t ! scene @v @t "
+                       "! write with_ground.json")
+                .code,
+            0);
+  const Outcome lost = levelsmith("read with_ground.json --as v" + ball + "! write lost.json");
+  EXPECT_EQ(lost.code, 2);
+  EXPECT_NE(lost.err.find("other parts than one"), std::string::npos) << lost.err;
+}
+
+/// The attribute jumps across the common face, so rays enter the solid there and do not leave it.
+TEST_F(Scenes, WarnOfAnOpenOperand) {
+  const std::string picture =
+      "read v.json --as v ! sphere --radius 0.2 --center 0,0,2 --voxel 0.05 --as b "
+      "! scene @v @b --csg 'v | b' ! render v.exr --size 64x48 --samples 1 --renderer cpu";
+  writeFile("v.json", twoBoxes(-9));
+  const Outcome open = levelsmith(picture);
+  EXPECT_EQ(open.code, 0);
+  EXPECT_NE(open.err.find("without leaving it"), std::string::npos) << open.err;
+  EXPECT_NE(shell("grep -ac ls:bezierOpen v.exr").out, "0\n");
+}
+
 }  // namespace scene_test
