@@ -46,6 +46,7 @@ void runWindow(const viewer::Arguments& arguments) {
     const bool isSettled = --frames <= 0 && !viewer.isBusy();
     if (window.wait(isSettled ? kIdle : kAfterEvent)) frames = kFramesAfterEvent;
   }
+  if (const std::string kept = viewer.keepUnsavedStrokes(); !kept.empty()) printMessage(kept);
 }
 
 int levelsmithView(const std::vector<std::string>& words) {

@@ -51,6 +51,10 @@ class Viewer {
   void requestPicture(int width, int height);
   [[nodiscard]] const ProgressivePicture& picture() const { return picture_; }
   [[nodiscard]] bool isBusy() const;
+
+  /// Writes the strokes of sculpting that no file has to a file beside the data. Returns a message;
+  /// empty without such strokes.
+  [[nodiscard]] std::string keepUnsavedStrokes() const;
   /// Opens a file as if the user had chosen it. A lattice file deforms the solid that is shown.
   void openChosen(const std::filesystem::path& file);
   /// Adds a picked point to the list of points in the panel, as a click on the surface does.

@@ -40,9 +40,11 @@ void Viewer::restartEditors(bool keepsDesign) {
   }
   if (sculptEditor_) {
     // Strokes belong to the heights before them, which may have changed.
+    const std::string kept = keepUnsavedStrokes();
     sculptEditor_ = nullptr;
     sculptModel_ = nullptr;
     if (keepsDesign && whyNoSculpting(*model_).empty()) startSculpting();
+    if (!kept.empty()) showMessage(kept);
   }
   startGivenDeformation();
 }

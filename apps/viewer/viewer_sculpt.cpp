@@ -27,14 +27,27 @@ std::filesystem::path editsBeside(const Model& model) {
 
 void Viewer::toggleSculptEditor() {
   if (sculptEditor_) {
+    const std::string kept = keepUnsavedStrokes();
     sculptEditor_ = nullptr;
     sculptModel_ = nullptr;
-    showMessage("The changes of the ground were put away.");
+    showMessage(kept.empty() ? "Sculpting has ended." : kept);
     return;
   }
   if (!model_) return;
   if (const std::string why = whyNoSculpting(*model_); !why.empty()) return showMessage(why);
   startSculpting();
+}
+
+std::string Viewer::keepUnsavedStrokes() const {
+  if (!sculptEditor_ || !sculptEditor_->hasUnsaved()) return "";
+  std::filesystem::path file = editsFile_;
+  file.replace_extension(".unsaved.edits");
+  try {
+    levelset::writeGroundEdits(file, sculptEditor_->edits());
+    return fmt::format("The strokes that were not written are in {}.", file.string());
+  } catch (const std::exception& error) {
+    return fmt::format("The strokes that were not written are lost: {}", error.what());
+  }
 }
 
 void Viewer::startSculpting() {
@@ -162,7 +175,7 @@ void Viewer::drawSculptPart() {
   if (ImGui::Button("Copy chain##sculpt")) copySculpting(true);
   if (ImGui::Button("Write##sculpt")) asksResult_ = true;
   ImGui::SameLine();
-  if (ImGui::Button("Put away##sculpt")) toggleSculptEditor();
+  if (ImGui::Button("End##sculpt")) toggleSculptEditor();
 }
 
 }  // namespace viewer

@@ -98,6 +98,9 @@ std::optional<V3d> groundUnder(const HeightField& field, const render::Camera::R
   const double margin = 1e-9 * (last - first);
   first += margin;
   last -= margin;
+  const double touch = 1e-6 * box.size().length();
+  // A level top of the ground lies on the box.
+  if (std::abs(above(first)) <= touch) return ray.origin + ray.direction * first;
   double before = first;
   for (double n = 1; n <= count; ++n) {
     const double now = first + (last - first) * (n / count);
@@ -114,7 +117,7 @@ std::optional<V3d> groundUnder(const HeightField& field, const render::Camera::R
   }
   // At the lowest point of the box the ray may end on the ground.
   const V3d end = ray.origin + ray.direction * last;
-  if (std::abs(above(last)) <= 1e-6 * box.size().length()) return end;
+  if (std::abs(above(last)) <= touch) return end;
   return std::nullopt;
 }
 
@@ -174,7 +177,7 @@ bool SculptEditor::press(const V2d& place, const render::Camera& camera) {
 bool SculptEditor::moveTo(const V2d& place, const render::Camera& camera) {
   pointer_ = groundUnder(field(), render::CameraRays(camera).at(place.x, place.y));
   if (!isDragging_ || !pointer_) return false;
-  const double step = kDabStep * choice_.radius;
+  const double step = kDabStep * done_.back().choice.radius;
   bool isChanged = false;
   for (std::size_t n = 0; n < kMostDabsOfAMove; ++n) {
     const V2d last = done_.back().places.back(), way = V2d(pointer_->x, pointer_->y) - last;

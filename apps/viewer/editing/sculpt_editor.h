@@ -31,7 +31,8 @@ struct BrushChoice {
 };
 
 /// First point at which a ray meets the triangles of a ground, to a millionth of a cell. Triangles
-/// with a missing corner are not met.
+/// with a missing corner are not met. Ridges that the ray cuts for less than half a cell may be
+/// missed.
 [[nodiscard]] std::optional<Imath::V3d> groundUnder(const levelset::HeightField& field,
                                                     const render::Camera::Ray& ray);
 

@@ -70,6 +70,16 @@ TEST(GroundUnder, IsTheFirstPointOfTheTriangles) {
   EXPECT_FALSE(groundUnder(level, {V3d(0.2, 0.3, 9), V3d(0, 0, -1)}));
 }
 
+TEST(GroundUnder, MeetsALevelTopAbovePits) {
+  HeightField field = support::terrainOf(21, 17, {1, 1}, [](double, double) { return 2; });
+  field.heights[field.index(10, 8)] = 1;
+  const V3d low(-6, -4, 2);
+  const auto below = groundUnder(field, {low + V3d(0, 0, 10), V3d(0, 0, -1)});
+  ASSERT_TRUE(below);
+  EXPECT_NEAR(below->z, 2, 1e-5);
+  EXPECT_NEAR(below->x, low.x, 1e-5);
+}
+
 TEST(SculptEditor, PlacesADabAtEachQuarterOfTheRadius) {
   const support::TemporaryFolder folder;
   const auto model = levelGround(folder);
